@@ -1,0 +1,53 @@
+"""Cold-start solvers, one algorithm a file, and their registry."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import jax
+
+from jaxrot.solvers import cayley, davenport, foam, quaternion_average, smith_franca, squaring, svd, torque
+
+
+class Method(NamedTuple):
+    """A solver and its domain.
+
+    Attributes:
+        solve: From (..., 3, 3) float32 or float64 to rotations of the same shape; carries no derivative rule.
+        exact: It computes the nearest rotation to rounding, not an approximation of it.
+        handles_inversion: Right for det A < 0 too.
+        scale_free: Right at every scale, from the smallest normal numbers to the largest.
+        condition_limit: By dtype, the largest κ = s1/(s2+s3) up to which it keeps the forward error within
+            8 eps (1+κ), measured over singular values of every kind that the flags admit; 0: nowhere.
+        source: Where it is from.
+    """
+
+    solve: Callable[[jax.Array], jax.Array]
+    exact: bool
+    handles_inversion: bool
+    scale_free: bool
+    condition_limit: Mapping[str, float]
+    source: str
+
+
+def _limit(float32: float, float64: float) -> Mapping[str, float]:
+    return MappingProxyType({"float32": float32, "float64": float64})
+
+
+# The whole contract holds for `squaring` alone, so it is the default.
+DEFAULT_METHOD = "squaring"
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "svd": Method(svd.solve, True, True, True, _limit(0, 0), "LAPACK; Kabsch 1976"),
+        "davenport": Method(davenport.solve, True, True, True, _limit(0, 0), "Davenport's q-method; Horn 1987"),
+        "smith_franca": Method(smith_franca.solve, True, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (16)"),
+        "quaternion_average": Method(
+            quaternion_average.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (30)"
+        ),
+        "cayley": Method(cayley.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (31)"),
+        "foam": Method(foam.solve, True, True, True, _limit(0, 0), "Markley 1993"),
+        "squaring": Method(squaring.solve, True, True, True, _limit(2.0**20, 2.0**49), "Wu et al. 2018 (FA3R)"),
+        "torque": Method(torque.solve, False, True, True, _limit(0, 0), "Müller et al. 2016, section 3"),
+    }
+)

@@ -1,0 +1,32 @@
+"""The average of the four quaternions that a noisy rotation matrix contains."""
+
+import functools
+
+import jax
+
+from jaxrot import _mat3, _quaternion
+from jaxrot._scaling import unit_scaled
+
+
+def solve(matrix: jax.Array) -> jax.Array:
+    """An approximation of the nearest rotation: always a rotation, by few multiplications.
+
+    The columns of 1 + N(A) are, for a rotation, multiples of one quaternion; for a noisy one they are averaged after
+    their signs have been made alike.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64, any scale.
+
+    Returns:
+        (..., 3, 3) rotations, exact for multiples of a rotation.
+
+    Cost: about 150 flops and one square root, for the scale.
+    Source: Sarabandi et al. 2020, eq. (27) and (30). They assume unit scale: on exact c·R the mean error is 6.5° at
+    c = 1.5, so the scale is removed here. sign(0) counts as +1: it must not drop a column.
+    """
+    columns = _quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))
+    longest, _ = _quaternion.longest(columns)
+    first, *others = (_quaternion.with_sign_of(_quaternion.dot(longest, column), column) for column in columns)
+    total = functools.reduce(_quaternion.add, others, first)
+    # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.
+    return _mat3.stack(_quaternion.to_rotation(total))

@@ -1,0 +1,47 @@
+"""The closed form A (AᵀA)^(−1/2) with Smith's eigenvalues and Franca's square root."""
+
+import jax
+import jax.numpy as jnp
+
+from jaxrot import _mat3
+from jaxrot._scaling import safe_sqrt, scaled
+
+
+def solve(matrix: jax.Array) -> jax.Array:
+    """The nearest rotation of a matrix with det A > 0 whose singular values are not far apart.
+
+    The square root of C = AᵀA comes from its eigenvalues by Cayley–Hamilton, without eigenvectors. For det A < 0 the
+    formula gives the nearest *reflection*, for det A = 0 it divides by zero; both are returned as they are.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64, any scale.
+
+    Returns:
+        (..., 3, 3). In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are good to
+        eps s1², and the small one is divided by.
+
+    Cost: about 250 flops, three square roots, one arc tangent, a sine and a cosine.
+    Source: Sarabandi et al. 2020, eq. (8)–(19), where (9) and (10) must read m − √p(cos θ ± √3 sin θ) (Smith 1961); as
+    printed the eigenvalues do not add up to the trace. Franca 1989.
+    """
+    # notation: m, q, p, theta, a0..a2 and b0..b2 are those of the paper.
+    a, _ = scaled(_mat3.components(matrix))
+    c = _mat3.transpose_multiply(a, a)
+    m = _mat3.trace(c) / 3
+    deviator = _mat3.add(c, _mat3.scale(_mat3.identity_like(c), -m))
+    q = _mat3.determinant(deviator) / 2
+    p = _mat3.squared_norm(deviator) / 6
+    # Where two eigenvalues are equal, rounding makes the discriminant negative.
+    theta = jnp.arctan2(safe_sqrt(p * p * p - q * q), q) / 3
+    root_p = safe_sqrt(p)
+    cosine, sine = root_p * jnp.cos(theta), root_p * jnp.sin(theta) * 3**0.5
+    eigenvalues = (m + 2 * cosine, m - (cosine + sine), m - (cosine - sine))
+    s1, s2, s3 = (safe_sqrt(eigenvalue) for eigenvalue in eigenvalues)
+    a2, a1, a0 = s1 + s2 + s3, s1 * s2 + s1 * s3 + s2 * s3, s1 * s2 * s3
+    denominator = a0 * (a2 * a1 - a0)
+    b2 = a2 / denominator
+    b1 = (a0 + a2 * (a2 * a2 - 2 * a1)) / denominator
+    b0 = (a2 * a1 * a1 - a0 * (a2 * a2 + a1)) / denominator
+    polynomial = _mat3.add(_mat3.scale(_mat3.multiply(c, c), b2), _mat3.scale(c, -b1))
+    polynomial = _mat3.add(polynomial, _mat3.scale(_mat3.identity_like(c), b0))
+    return _mat3.stack(_mat3.multiply(a, polynomial))

@@ -1,0 +1,23 @@
+"""The singular value decomposition of LAPACK: slow, trusted, the control."""
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+
+def solve(matrix: jax.Array) -> jax.Array:
+    """The nearest rotation U diag(1, 1, det UVᵀ) Vᵀ.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64.
+
+    Returns:
+        (..., 3, 3) rotations.
+
+    Source: Kabsch 1976; Sarabandi et al. 2020, eq. (5), which as printed, diag(1, 1, −1), is right for det < 0 alone.
+    """
+    left, _, right = jnp.linalg.svd(matrix, full_matrices=False)
+    product = lax.Precision.HIGHEST
+    sign = jnp.sign(jnp.linalg.det(jnp.matmul(left, right, precision=product)))
+    right = jnp.concatenate([right[..., :2, :], right[..., 2:, :] * sign[..., None, None]], axis=-2)
+    return jnp.matmul(left, right, precision=product)
