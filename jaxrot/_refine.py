@@ -1,0 +1,108 @@
+"""The nearest rotation from a warm start, by a fixed number of steps."""
+
+import functools
+
+import jax
+from jax.typing import ArrayLike
+
+from jaxrot import _mat3, _quaternion
+from jaxrot._derivative import angular_tangent
+from jaxrot._inputs import check_choice, check_iterations, check_matrix, check_start
+from jaxrot._scaling import scaled
+from jaxrot.steps import STEPS
+from jaxrot.steps.iteration import iterate
+
+
+def refine_rotation(matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torque", iterations: int = 3) -> jax.Array:
+    """Moves a rotation towards the one nearest to a 3×3 matrix, by a fixed number of steps.
+
+    Each step increases tr(RᵀA) towards its maximum over the rotations. Made for simulations: the rotation of the last
+    frame is the start, few iterations are enough, and what A leaves undetermined is kept from the start (all of it for
+    A = 0, the angle about the axis for rank 1).
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+        rotation: The start, shape (..., 3, 3); its batch axes broadcast against those of `matrix`.
+        step: A name in `STEPS`. Static.
+        iterations: How many steps, ≥ 0. Static.
+
+    Returns:
+        A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`. With
+        `torque` the error shrinks by max|sᵢ| / |Σsᵢ| a step.
+
+    Raises:
+        ValueError: Wrong shape, unknown step, negative iterations.
+        TypeError: Complex or non-numeric arrays, traced step or iterations.
+
+    Uniqueness:
+        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) `torque` stands still.
+
+    Derivative:
+        The implicit rule of `nearest_rotation`, at the rotation that was reached: right at convergence, and zero with
+        respect to the start, on which the limit does not depend.
+
+    Source: Müller et al. 2016, eq. (7), with the errata stated in `steps/torque.py`.
+    """
+    checked = check_matrix(matrix)
+    start = check_start(rotation, "rotation", (3, 3), checked.value).value
+    quaternion = _quaternion.stack(_quaternion.from_rotation(_mat3.components(start)))
+    refined = _refine(checked.value, quaternion, step, iterations)
+    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined))).astype(checked.dtype)
+
+
+def refine_quaternion_wxyz(
+    matrix: ArrayLike, quaternion_wxyz: ArrayLike, *, step: str = "torque", iterations: int = 3
+) -> jax.Array:
+    """Moves a quaternion (w, x, y, z) towards the rotation nearest to a 3×3 matrix; see `refine_rotation`.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+        quaternion_wxyz: The start, shape (..., 4), any length but 0; its batch axes broadcast against
+            those of `matrix`.
+        step: A name in `STEPS`. Static.
+        iterations: How many steps, ≥ 0. Static.
+
+    Returns:
+        A unit quaternion, shape (..., 4) of the broadcast batch, dtype of `matrix`. Its sign continues that of the
+        start: it does not jump from frame to frame, and w may be negative.
+
+    Raises:
+        ValueError: Wrong shape, unknown step, negative iterations.
+        TypeError: Complex or non-numeric arrays, traced step or iterations.
+
+    Uniqueness:
+        As for `refine_rotation`.
+
+    Derivative:
+        As for `refine_rotation`.
+
+    Source: Müller et al. 2016, appendix D.
+    """
+    checked = check_matrix(matrix)
+    start = check_start(quaternion_wxyz, "quaternion_wxyz", (4,), checked.value).value
+    quaternion = _quaternion.stack(_quaternion.normalise(_quaternion.components(start)))
+    return _refine(checked.value, quaternion, step, iterations).astype(checked.dtype)
+
+
+def _refine(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int) -> jax.Array:
+    step = check_choice(step, "step", STEPS)
+    matrix = jax.numpy.broadcast_to(matrix, (*quaternion.shape[:-1], 3, 3))
+    return _refined(matrix, quaternion, step, check_iterations(iterations), 0)
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4))
+def _refined(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, order: int) -> jax.Array:
+    """The iteration, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
+    a, _ = scaled(_mat3.components(matrix))
+    return _quaternion.stack(iterate(STEPS[step].correction, a, _quaternion.components(quaternion), iterations))
+
+
+@_refined.defjvp
+def _refined_jvp(step: str, iterations: int, order: int, primals, tangents):
+    (matrix, quaternion), (matrix_dot, _) = primals, tangents
+    refined = _refined(matrix, quaternion, step, iterations, order + 1)
+    q = _quaternion.components(refined)
+    rotation = _mat3.stack(_quaternion.to_rotation(q))
+    x, y, z = angular_tangent(matrix, rotation, matrix_dot, order=order)
+    zero = x - x
+    return refined, 0.5 * _quaternion.stack(_quaternion.product(q, (zero, x, y, z)))
