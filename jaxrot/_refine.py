@@ -94,7 +94,11 @@ def _refine(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int
 def _refined(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, order: int) -> jax.Array:
     """The iteration, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
     a, _ = scaled(_mat3.components(matrix))
-    return _quaternion.stack(iterate(STEPS[step].correction, a, _quaternion.components(quaternion), iterations))
+    # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
+    zero = a[0][0] * 0
+    w, x, y, z = _quaternion.components(quaternion)
+    start = (w + zero, x + zero, y + zero, z + zero)
+    return _quaternion.stack(iterate(STEPS[step].correction, a, start, iterations))
 
 
 @_refined.defjvp

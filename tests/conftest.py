@@ -1,0 +1,18 @@
+"""Settings under which every test runs: as strict as a caller may be."""
+
+import os
+import pathlib
+
+# Each program from the cache is announced on stderr with its processor features; that would bury a failure.
+os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
+# Sharding is tested on simulated devices; everything else runs on the first.
+jax.config.update("jax_num_cpu_devices", 8)
+# Compilation is what the suite spends its time on, and each of its processes compiles much the same.
+jax.config.update("jax_compilation_cache_dir", str(pathlib.Path(__file__).parent.parent / ".jax_cache"))
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)

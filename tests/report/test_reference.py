@@ -1,0 +1,164 @@
+"""The reference against mpmath and LAPACK, and every measure of error against a rotation that is wrong."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from jaxrot.families import FAMILIES, poison
+from jaxrot.report import reference
+from jaxrot.report.reference import EPS
+
+MEASURES = (reference.forward_error, reference.lost_trace, reference.torque, reference.certificate_gap)
+
+
+def rotation_about_z(angle):
+    c, s = np.cos(np.longdouble(angle)), np.sin(np.longdouble(angle))
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def nearest_rotation_in_50_digits(matrix):
+    """R, s and kappa, rounded to long double."""
+    with mpmath.workdps(50):
+        left, s, right = mpmath.svd_r(mpmath.matrix(matrix.tolist()))
+        sign = mpmath.sign(mpmath.det(left) * mpmath.det(right))
+        r = left * mpmath.diag([1, 1, sign]) * right
+        numbers = [*r, s[0], s[1], sign * s[2]]
+        values = np.array([np.longdouble(mpmath.nstr(x, 30)) for x in numbers])
+        return values[:9].reshape(3, 3), values[9:], float(s[0] / (s[1] + sign * s[2]))
+
+
+def all_families(dtype, count=24):
+    return np.concatenate([family.sample(count, dtype, seed=1).matrices for family in FAMILIES.values()])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["gaussian", "ill_conditioned", "needle", "vanishing_gap", "minus_rotation_graded", "sparse_inverted", "rank_two"],
+)
+def test_float64_reference_agrees_with_50_digits(name):
+    matrices = FAMILIES[name].sample(6, np.float64, seed=2).matrices
+    solved = reference.solve(matrices)
+    for i, matrix in enumerate(matrices):
+        r, s, kappa = nearest_rotation_in_50_digits(matrix)
+        assert np.linalg.norm((solved.rotation[i] - r).astype(float)) <= 16 * EPS * (1 + kappa)
+        assert np.abs(solved.singular_values[i] - s).max() <= 8 * EPS * s[0]
+        assert reference.condition(matrix) == pytest.approx(kappa, rel=float(16 * EPS * (1 + kappa)) + 1e-15)
+
+
+def test_reference_agrees_with_lapack_and_the_special_orthogonal_fix():
+    matrices = FAMILIES["gaussian"].sample(200, np.float64).matrices
+    left, s, right = np.linalg.svd(matrices)
+    sign = np.linalg.det(left @ right)
+    left[:, :, 2] *= sign[:, None]
+    kappa = s[:, 0] / (s[:, 1] + sign * s[:, 2])
+    error = np.linalg.norm((reference.reference_rotation(matrices) - left @ right).astype(float), axis=(1, 2))
+    assert (error <= 32 * np.finfo(np.float64).eps * (1 + kappa)).all()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64], ids=["float32", "float64"])
+def test_reference_passes_its_own_certificate_on_every_family(dtype):
+    matrices = all_families(dtype)
+    solved = reference.solve(matrices)
+    r = solved.rotation
+    assert reference.orthogonality_error(r).max() <= 32 * EPS
+    assert np.abs(reference.lost_trace(r, matrices, reference=solved)).max() <= 16 * EPS
+    assert reference.torque(r, matrices, reference=solved).max() <= 16 * EPS
+    assert reference.certificate_gap(r, matrices, reference=solved).min() >= -16 * EPS
+    for factor in (solved.left, solved.right):
+        assert reference.orthogonality_error(factor).max() <= 32 * EPS
+
+
+def test_reference_is_a_rotation_at_exact_rank_one():
+    vectors = np.array(list(np.ndindex(4, 4, 4))[1:], float) * (1, -2, 0.5)
+    for right in ((1, 0, 0), (0, 4, 0), (1, -1, 2), (3, 1, 2)):
+        matrices = vectors[:, :, None] * np.array(right, float)
+        solved = reference.solve(matrices)
+        assert reference.orthogonality_error(solved.rotation).max() <= 32 * EPS
+        assert np.abs(reference.lost_trace(solved.rotation, matrices, reference=solved)).max() <= 16 * EPS
+        s1 = np.linalg.norm(vectors, axis=1) * np.linalg.norm(right)
+        np.testing.assert_allclose(solved.singular_values[:, 0].astype(float), s1, rtol=1e-15)
+        assert (np.abs(solved.singular_values[:, 1:]) <= 16 * EPS * s1[:, None]).all()
+
+
+def test_reference_does_not_depend_on_the_scale_or_on_its_neighbours():
+    matrices = FAMILIES["ill_conditioned"].sample(50, np.float64).matrices
+    solved = reference.solve(matrices)
+    # 2^-900 and not below: entries that become subnormal are another matrix.
+    for exponent in (-900, 700):
+        other = reference.solve(np.ldexp(matrices, exponent))
+        np.testing.assert_array_equal(other.rotation, solved.rotation)
+        np.testing.assert_array_equal(other.singular_values, np.ldexp(solved.singular_values, exponent))
+    poisoned = reference.reference_rotation(poison(matrices))
+    bad = np.arange(50) % 3 == 0
+    assert np.isnan(poisoned[bad]).all()
+    np.testing.assert_array_equal(poisoned[~bad], solved.rotation[~bad])
+
+
+def test_reference_takes_any_batch():
+    matrices = FAMILIES["gaussian"].sample(6).matrices
+    whole = reference.reference_rotation(matrices)
+    np.testing.assert_array_equal(reference.reference_rotation(matrices.reshape(2, 3, 3, 3)).reshape(6, 3, 3), whole)
+    np.testing.assert_array_equal(reference.reference_rotation(matrices[4]), whole[4])
+    assert reference.reference_rotation(matrices[:0]).shape == (0, 3, 3)
+    assert [measure(whole[:0], matrices[:0]).shape for measure in MEASURES] == [(0,)] * 4
+    assert [measure(whole[4], matrices[4]).shape for measure in MEASURES] == [()] * 4
+
+
+def test_zero_has_no_error_but_not_a_number_stays_one():
+    zero, turn = np.zeros((3, 3), np.float32), rotation_about_z(1.0)
+    np.testing.assert_array_equal(reference.reference_rotation(zero), np.eye(3))
+    assert reference.condition(zero) == np.inf
+    for measure in MEASURES:
+        assert measure(turn, zero) == 0
+        for broken in (turn * np.nan, np.full((3, 3), np.inf)):
+            assert np.isnan(measure(broken, zero))
+            assert np.isnan(measure(broken, np.eye(3)))
+        assert np.isnan(measure(turn, np.full((3, 3), np.inf)))
+    assert np.isnan(reference.orthogonality_error(turn * np.nan))
+
+
+def test_condition_is_that_of_the_spectrum():
+    diagonals = np.array([(1, 1, 1), (4, 2, 0), (4, 2, -1), (1, 0.5, -0.5), (1, 0, 0), (-1, -1, -1), (0, 0, 0)])
+    expected = (0.5, 2, 4, np.inf, np.inf, np.inf, np.inf)
+    np.testing.assert_array_equal(reference.condition(diagonals[:, None] * np.eye(3)), expected)
+
+
+# A turn about the third principal axis of diag(3, 2, 1): every measure has a closed form.
+@pytest.mark.parametrize("angle", [1e-6, 0.1, 2.0])
+@pytest.mark.parametrize("scale", [2.0**-1000, 1.0, 2.0**1000])
+def test_a_turned_rotation_is_reported(angle, scale):
+    turn, matrix = rotation_about_z(angle), scale * np.diag((3.0, 2.0, 1.0))
+    assert reference.forward_error(turn, matrix) == pytest.approx(np.sqrt(8) * np.sin(angle / 2), rel=1e-12)
+    assert reference.lost_trace(turn, matrix) == pytest.approx(
+        10 / 3 * np.sin(angle / 2) ** 2, rel=1e-5
+    )  # loses what cos does
+    assert reference.torque(turn, matrix) == pytest.approx(np.sqrt(2) * 5 / 3 * abs(np.sin(angle)), rel=1e-12)
+    symmetric = np.diag((3, 2, 0)) * np.cos(angle) + np.diag((0, 0, 1.0))
+    symmetric[0, 1] = symmetric[1, 0] = (2 - 3) * np.sin(angle) / 2
+    gap = np.trace(symmetric) - np.linalg.eigvalsh(symmetric)[-1]
+    assert reference.certificate_gap(turn, matrix) == pytest.approx(gap / 3, rel=1e-12)
+
+
+def test_an_equilibrium_that_is_not_the_nearest_rotation_is_reported():
+    matrix, half_turn = np.diag((3.0, 2.0, 1.0)), np.diag((1.0, -1.0, -1.0))
+    assert reference.torque(half_turn, matrix) == 0
+    assert reference.certificate_gap(half_turn, matrix) == -1
+    assert reference.certificate_gap(np.eye(3), matrix) == 1
+    assert reference.lost_trace(half_turn, matrix) == 2
+
+
+def test_what_is_not_a_rotation_is_reported():
+    assert reference.orthogonality_error(np.eye(3)) == 0
+    assert reference.orthogonality_error(1.5 * np.eye(3)) == pytest.approx(np.sqrt(3) * 1.25)
+    assert reference.orthogonality_error(np.zeros((3, 3))) >= 2
+    for reflection in (-np.eye(3), np.diag((1, 1, -1))):
+        assert reference.orthogonality_error(reflection) >= 2
+
+
+def test_a_reference_at_hand_changes_nothing():
+    matrices = FAMILIES["gaussian"].sample(20).matrices
+    wrong = FAMILIES["rotation"].sample(20).matrices
+    solved = reference.solve(matrices)
+    for measure in MEASURES:
+        np.testing.assert_array_equal(measure(wrong, matrices), measure(wrong, matrices, reference=solved))
+        assert (measure(wrong, matrices) != 0).all()

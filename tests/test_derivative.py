@@ -1,0 +1,200 @@
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from certificate import assert_within, family_batch, resolved
+from jax.test_util import check_grads
+
+from jaxrot import METHODS, nearest_quaternion_wxyz, nearest_rotation
+from jaxrot.report import reference
+
+RANDOM = np.random.default_rng(0)
+DTYPES = ["float32", "float64"]
+POINTS = {
+    "rotation": np.eye(3),
+    "rank two": np.diag([1, 0.7, 0]),
+    "inverted": np.diag([1, 0.8, -0.5]),
+    "equal": np.diag([2.0, 2, -0.5]),
+    "generic": np.array([[1.0, 0.3, -0.2], [0.1, 0.8, 0.4], [-0.3, 0.2, 1.3]]),
+}
+points = pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+
+
+def analytic_jacobian(matrices, damping=0.0):
+    """The 9×9 Jacobians by the singular vectors: Ṙ = U Ω Vᵀ, Ω_ij = (M_ij − M_ji)/(s_i+s_j), M = UᵀȦV."""
+    solved = reference.solve(matrices)
+    left, right = np.asarray(solved.left), np.asarray(solved.right)
+    sums = np.asarray(solved.singular_values)[..., :, None] + np.asarray(solved.singular_values)[..., None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = sums / (sums**2 + (damping * np.asarray(solved.singular_values).sum(-1))[..., None, None] ** 2)
+    inverse[..., range(3), range(3)] = 0
+    # M for the unit tangents E_kl: M_ij = U_ki V_lj.
+    m = np.einsum("...ki,...lj->...ijkl", left, right)
+    omega = inverse[..., None, None] * (m - m.swapaxes(-4, -3))
+    jacobian = np.einsum("...mi,...ijkl,...nj->...mnkl", left, omega, right)
+    return jacobian.reshape(*jacobian.shape[:-4], 9, 9)
+
+
+@functools.lru_cache
+def jacobians(dtype, mode, damping=0.0):
+    """The 9×9 Jacobian of every matrix of the family batch."""
+    function = functools.partial(nearest_rotation, damping=damping)
+    jacobian = {"forward": jax.jacfwd, "reverse": jax.jacrev}[mode]
+    return np.asarray(jax.jit(jax.vmap(jacobian(function)))(family_batch(dtype).matrices)).reshape(-1, 9, 9)
+
+
+@pytest.mark.parametrize("mode", ["forward", "reverse"])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_jacobian_is_right_to_rounding_on_every_family(dtype, mode):
+    batch = family_batch(dtype)
+    eps = np.finfo(dtype).eps
+    where = resolved(batch, 1 / (128 * eps))
+    exact = analytic_jacobian(batch.matrices[where])
+    size = np.sqrt((exact**2).sum((1, 2)))
+    error = np.sqrt(((jacobians(dtype, mode)[where] - exact) ** 2).sum((1, 2)))
+    # At the ends of the dtype's range the exact Jacobian overflows, or its entries are flushed to zero.
+    holds = size < np.finfo(dtype).max / 4
+    error = np.maximum(error - 9 * np.finfo(dtype).tiny, 0)[holds] / size[holds]
+    bound = 32 * eps * np.maximum(batch.condition[where], 1)
+    assert_within(error, bound[holds], batch.families[where][holds], "Jacobian")
+
+
+@pytest.mark.parametrize("mode", ["forward", "reverse"])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_jacobian_is_finite_and_bounded_on_every_family(dtype, mode):
+    batch = family_batch(dtype)
+    got = jacobians(dtype, mode).astype(np.longdouble)
+    assert_within(np.abs(got).max(axis=(1, 2)), np.finfo(dtype).max, batch.families, "finite Jacobian")
+    total = np.asarray(reference.signed_singular_values(batch.matrices)).sum(-1)
+    normal = total > 64 * np.finfo(dtype).tiny
+    norm = np.linalg.norm((got[normal] * total[normal, None, None]).astype(np.float64), 2, axis=(1, 2))
+    assert_within(norm, 1.01 / (64 * np.finfo(dtype).eps), batch.families[normal], "norm of the Jacobian times tr S")
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_forward_and_reverse_are_transposes(dtype):
+    forward, reverse = jacobians(dtype, "forward"), jacobians(dtype, "reverse")
+    size = np.abs(forward).max(axis=(1, 2), keepdims=True)
+    # What is subnormal is flushed on one way or the other.
+    slack = 64 * (np.finfo(dtype).eps * size + np.finfo(dtype).tiny)
+    assert (np.abs(forward - reverse) <= slack).all()
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(("function", "highest"), [(nearest_rotation, 3), (nearest_quaternion_wxyz, 2)])
+def test_derivatives_of_every_order_are_finite_on_every_family(function, highest, dtype):
+    batch = family_batch(dtype)
+    tangents = RANDOM.uniform(-1, 1, (highest, *batch.matrices.shape)).astype(dtype)
+
+    def with_derivative(f, tangent):
+        """Appends to the orders that f returns the derivative of the last of them."""
+
+        def extended(a):
+            orders, tangents_out = jax.jvp(f, (a,), (tangent,))
+            return (*orders, tangents_out[-1])
+
+        return extended
+
+    extended = lambda a: (function(a),)  # noqa: E731
+    for tangent in tangents:
+        extended = with_derivative(extended, tangent)
+    for order, value in enumerate(jax.jit(extended)(batch.matrices)):
+        largest = np.abs(np.asarray(value)).reshape(len(batch.matrices), -1).max(-1)
+        assert_within(largest, np.finfo(dtype).max, batch.families, f"finite derivative of order {order}")
+
+
+@points
+def test_the_derivative_of_each_order_is_that_of_the_lower_one(matrix):
+    first = jax.jacrev(nearest_rotation)
+    second = jax.jacfwd(first)
+    third = jax.jacfwd(second)
+    h = 1e-5
+    for function, derivative in ((nearest_rotation, first), (first, second), (second, third)):
+        got = np.asarray(jax.jit(derivative)(matrix))
+        value = jax.jit(function)
+        for entry in range(9):
+            step = h * np.eye(9)[entry].reshape(3, 3)
+            difference = (np.asarray(value(matrix + step)) - np.asarray(value(matrix - step))) / (2 * h)
+            scale = max(1, np.abs(got).max())
+            np.testing.assert_allclose(got.reshape(*got.shape[:-2], 9)[..., entry], difference, atol=2e-8 * scale)
+
+
+@points
+def test_check_grads_agrees(matrix):
+    check_grads(jax.jit(nearest_rotation), (matrix,), order=1, modes=["fwd", "rev"], atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_has_the_same_derivative_at_a_rotation(method):
+    jacobian = jax.jacrev(functools.partial(nearest_rotation, method=method))(np.eye(3))
+    np.testing.assert_allclose(np.asarray(jacobian).reshape(9, 9), analytic_jacobian(np.eye(3)), atol=1e-13)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("exponent", [-60, 60])
+def test_the_derivative_is_scale_free_bit_for_bit(dtype, exponent):
+    matrices = RANDOM.standard_normal((16, 3, 3)).astype(dtype)
+    matrices[0] = np.diag([1, 1, -1])
+    jacobian = jax.jit(jax.vmap(jax.jacrev(nearest_rotation)))
+    expected = np.ldexp(np.asarray(jacobian(matrices)), -exponent)
+    np.testing.assert_array_equal(np.asarray(jacobian(np.ldexp(matrices, exponent))), expected)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_second_derivative_scales_too(dtype):
+    matrix = POINTS["generic"].astype(dtype)
+    hessian = jax.jit(jax.jacfwd(jax.jacrev(nearest_rotation)))
+    expected = np.asarray(hessian(matrix))
+    for exponent in (-20, 20):
+        got = np.ldexp(np.asarray(hessian(np.ldexp(matrix, exponent))), 2 * exponent)
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e2 * np.finfo(dtype).eps)
+
+
+@pytest.mark.parametrize("mode", ["forward", "reverse"])
+@pytest.mark.parametrize("damping", [1e-2, 1.0])
+def test_damping_is_relative_and_leaves_the_value_alone(mode, damping):
+    batch = family_batch("float64")
+    where = np.isin(batch.families, ["gaussian", "rank_one", "inversion", "scale_large", "minus_identity"])
+    exact = analytic_jacobian(batch.matrices[where], damping).astype(np.float64)
+    got = jacobians("float64", mode, damping)[where]
+    size = np.abs(exact).max(axis=(1, 2), keepdims=True)
+    # R itself differs from the reference's where it is not unique; so does then the Jacobian.
+    unique = batch.condition[where] < 1e6
+    np.testing.assert_allclose((got / size)[unique], (exact / size)[unique], atol=1e-11)
+    norm = np.linalg.norm(got, 2, axis=(1, 2)) * batch.singular_values[where].sum(-1)
+    assert (norm <= 1.001 / damping).all()
+    np.testing.assert_array_equal(nearest_rotation(batch.matrices, damping=damping), nearest_rotation(batch.matrices))
+
+
+def test_an_unresolved_axis_does_not_move_and_a_resolved_one_does():
+    """Rank 1: R may turn freely about a1, and the derivative says nothing of that turn, all of the others."""
+    matrix = np.zeros((3, 3))
+    matrix[0, 0] = 2.0
+    rotation = np.asarray(nearest_rotation(matrix))
+    turn = {axis: rotation @ np.cross(np.eye(3)[axis], np.eye(3)).T for axis in range(3)}
+    jacobian = np.asarray(jax.jacfwd(nearest_rotation)(matrix))
+    for axis, expected in ((0, 0.0), (1, 1.0), (2, 1.0)):
+        # Turning A with R turns R as much; a turn about the first axis does not change A.
+        moved = np.einsum("ijkl,kl->ij", jacobian, np.cross(np.eye(3)[axis], matrix.T).T)
+        np.testing.assert_allclose(moved, expected * np.cross(np.eye(3)[axis], rotation.T).T, atol=1e-12)
+    assert len(turn) == 3
+    np.testing.assert_array_equal(jax.jacrev(nearest_rotation)(np.zeros((3, 3))), np.zeros((3, 3, 3, 3)))
+
+
+@pytest.mark.parametrize("start", [np.zeros((3, 3)), np.diag([1.0, 0, 0]), -np.eye(3), np.diag([1.0, 1, -1])])
+def test_gradient_descent_leaves_a_singular_start(start):
+    """A learned head may begin there: the loss must go down and never be NaN."""
+    target = np.asarray(nearest_rotation(POINTS["generic"] + 0.3))
+    loss = lambda a: jnp.sum((nearest_rotation(a, damping=1e-2) - target) ** 2)  # noqa: E731
+    gradient = jax.jit(jax.value_and_grad(loss))
+    matrix = start + 1e-3 * np.random.default_rng(1).standard_normal((3, 3))
+    values = []
+    for _ in range(300):
+        value, slope = gradient(matrix)
+        values.append(float(value))
+        # The gradient of a function without scale goes like 1/‖A‖.
+        matrix = matrix - 0.02 * np.sum(np.square(matrix)) * slope
+    assert np.isfinite(values).all()
+    assert values[-1] < 0.05 * values[0]

@@ -1,0 +1,158 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxrot
+from jaxrot import nearest_quaternion_wxyz, nearest_rotation, refine_quaternion_wxyz, refine_rotation
+
+A = np.random.default_rng(0).standard_normal((4, 3, 3))
+FUNCTIONS = {
+    "nearest_rotation": nearest_rotation,
+    "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
+    "refine_rotation": lambda a: refine_rotation(a, np.eye(3)),
+    "refine_quaternion_wxyz": lambda a: refine_quaternion_wxyz(a, np.eye(4)[0]),
+}
+all_functions = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS.keys())
+
+
+@all_functions
+@pytest.mark.parametrize("shape", [(), (3,), (3, 4), (2, 3), (9,), (3, 3, 5)])
+def test_a_wrong_shape_is_refused_at_trace_time(function, shape):
+    with pytest.raises(ValueError, match=r"matrix must be .* shape \(\.\.\., 3, 3\); got shape"):
+        jax.jit(function)(np.ones(shape))
+
+
+def test_trailing_batch_axes_get_the_recipe():
+    with pytest.raises(ValueError, match="in_axes=-1, out_axes=-1"):
+        nearest_rotation(np.ones((3, 3, 5)))
+    trailing = jax.vmap(nearest_rotation, in_axes=-1, out_axes=-1)(np.moveaxis(A, 0, -1))
+    np.testing.assert_array_equal(np.moveaxis(trailing, -1, 0), nearest_rotation(A))
+
+
+@all_functions
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128, object, "U1", "M8[s]"])
+def test_a_dtype_that_is_not_real_is_refused(function, dtype):
+    with pytest.raises(TypeError, match="matrix must be a real array"):
+        function(np.zeros((3, 3)).astype(dtype))
+
+
+@all_functions
+def test_what_is_no_array_is_refused(function):
+    for argument in (None, "rotation", {"a": 1}):
+        with pytest.raises(TypeError, match="matrix must be a real array"):
+            function(argument)
+
+
+@all_functions
+@pytest.mark.parametrize("dtype", [jnp.float16, jnp.bfloat16])
+def test_half_precision_is_computed_in_float32(function, dtype):
+    half = jnp.asarray(A, dtype)
+    assert function(half).dtype == dtype
+    np.testing.assert_array_equal(function(half), function(half.astype(jnp.float32)).astype(dtype))
+
+
+@all_functions
+@pytest.mark.parametrize("dtype", [np.int8, np.int32, np.uint8, np.bool_])
+def test_integers_become_the_default_float(function, dtype):
+    integers = (np.abs(A * 3)).astype(dtype)
+    result = function(integers)
+    assert result.dtype == np.float64
+    np.testing.assert_array_equal(result, function(integers.astype(np.float64)))
+
+
+def test_lists_are_admitted():
+    np.testing.assert_array_equal(nearest_rotation([[1, 0, 0], [0, 2, 0], [0, 0, 3]]), np.eye(3))
+
+
+@pytest.mark.parametrize("method", jaxrot.METHODS)
+@pytest.mark.parametrize("shape", [(), (0,), (2, 0), (1,), (2, 1, 3)])
+def test_any_batch_shape_is_kept(method, shape):
+    matrices = np.broadcast_to(A[0], (*shape, 3, 3))
+    rotation = nearest_rotation(matrices, method=method)
+    quaternion = nearest_quaternion_wxyz(matrices, method=method)
+    assert rotation.shape == (*shape, 3, 3)
+    assert quaternion.shape == (*shape, 4)
+    # XLA may contract products and sums differently for each shape.
+    single = np.asarray(nearest_rotation(A[0], method=method))
+    np.testing.assert_allclose(rotation, np.broadcast_to(single, rotation.shape), atol=1e-14)
+
+
+def test_transposed_views_and_device_arrays_give_the_same_numbers():
+    expected = nearest_rotation(A)
+    np.testing.assert_array_equal(nearest_rotation(np.asfortranarray(A)), expected)
+    np.testing.assert_array_equal(nearest_rotation(jnp.asarray(A)), expected)
+    np.testing.assert_array_equal(nearest_rotation(np.ascontiguousarray(A.swapaxes(1, 2)).swapaxes(1, 2)), expected)
+
+
+def test_an_unknown_method_or_step_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"method must be one of .*squaring.*; got 'kabsch'"):
+        nearest_rotation(A, method="kabsch")
+    with pytest.raises(ValueError, match=r"step must be one of .*torque.*; got 'gauss'"):
+        refine_rotation(A, np.eye(3), step="gauss")
+    with pytest.raises(TypeError, match="method must be a string; got int"):
+        nearest_rotation(A, method=3)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("iterations", "error"), [(-1, ValueError), (1.5, TypeError), (True, TypeError), ("3", TypeError)]
+)
+def test_bad_iterations_are_refused(iterations, error):
+    with pytest.raises(error, match="iterations must be"):
+        refine_rotation(A, np.eye(3), iterations=iterations)
+
+
+def test_traced_options_are_refused():
+    with pytest.raises(TypeError, match="iterations must be a static"):
+        jax.jit(lambda n: refine_rotation(A, np.eye(3), iterations=n))(3)
+    with pytest.raises(TypeError, match="damping must be a static"):
+        jax.jit(lambda d: nearest_rotation(A, damping=d))(0.1)
+
+
+@pytest.mark.parametrize("damping", [-0.1, float("nan"), float("inf")])
+def test_bad_damping_is_refused(damping):
+    with pytest.raises(ValueError, match="damping must be finite and >= 0"):
+        nearest_rotation(A, damping=damping)
+
+
+def test_a_start_of_the_wrong_shape_is_refused():
+    with pytest.raises(ValueError, match=r"rotation must be .* \(\.\.\., 3, 3\); got shape \(4,\)"):
+        refine_rotation(A, np.ones(4))
+    with pytest.raises(ValueError, match=r"quaternion_wxyz must be .* \(\.\.\., 4\); got shape \(3, 3\)"):
+        refine_quaternion_wxyz(A, np.eye(3))
+    with pytest.raises(ValueError, match="batch axes of matrix and rotation must broadcast"):
+        refine_rotation(A, np.broadcast_to(np.eye(3), (5, 3, 3)))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(value, dtype):
+    clean = A.astype(dtype)
+    for entry in range(9):
+        spoiled = clean.copy()
+        spoiled[1].flat[entry] = value
+        for function in FUNCTIONS.values():
+            result = np.asarray(jax.jit(function)(spoiled))
+            assert np.isnan(result[1]).all()
+            np.testing.assert_array_equal(
+                np.delete(result, 1, 0), np.delete(np.asarray(jax.jit(function)(clean)), 1, 0)
+            )
+
+
+def test_every_public_function_works_without_x64():
+    jax.config.update("jax_enable_x64", False)
+    try:
+        for name, function in FUNCTIONS.items():
+            for matrices in (
+                A,
+                A.astype(np.float32),
+                [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+                jnp.ones((3, 3), jnp.bfloat16),
+            ):
+                result = function(matrices)
+                assert np.isfinite(np.asarray(result, np.float32)).all(), name
+                assert result.dtype in (jnp.float32, jnp.bfloat16)
+        jacobian = jax.jacrev(nearest_rotation)(jnp.asarray(A))
+        assert jacobian.dtype == jnp.float32
+    finally:
+        jax.config.update("jax_enable_x64", True)

@@ -1,0 +1,98 @@
+"""Method × dtype × family × transform, against the certificate."""
+
+import functools
+
+import jax
+import numpy as np
+import pytest
+from certificate import assert_contract, assert_forward_error, assert_rotations, family_batch, resolved
+
+from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation
+
+DTYPES = ["float32", "float64"]
+
+
+def transformed(method, transform):
+    function = functools.partial(nearest_rotation, method=method)
+    return {
+        "eager": function,
+        "jit": jax.jit(function),
+        "vmap": jax.vmap(function),
+        "jit∘vmap": jax.jit(jax.vmap(function)),
+    }[transform]
+
+
+def within_domain(method, batch):
+    """The matrices for which the method's record promises 8 eps (1+κ)."""
+    record = METHODS[method]
+    where = resolved(batch, record.condition_limit[batch.matrices.dtype.name])
+    if not record.handles_inversion:
+        where &= batch.singular_values[:, 2] > 0
+    if not record.scale_free:
+        where &= (batch.singular_values[:, 0] > 1e-3) & (batch.singular_values[:, 0] < 1e3)
+    return where
+
+
+@pytest.mark.parametrize("transform", ["eager", "jit", "vmap", "jit∘vmap"])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_method_keeps_its_promise_on_every_family(method, dtype, transform):
+    batch = family_batch(dtype)
+    rotation = np.asarray(transformed(method, transform)(batch.matrices))
+    assert rotation.dtype == dtype
+    if method == DEFAULT_METHOD:
+        assert_contract(rotation, batch)
+    assert_forward_error(rotation, batch, within_domain(method, batch))
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_returns_an_exact_rotation_as_it_is(method, dtype):
+    batch = family_batch(dtype)
+    where = np.isin(batch.families, ["rotation", "identity", "half_turn", "swap"])
+    rotation = np.asarray(jax.jit(functools.partial(nearest_rotation, method=method))(batch.matrices))
+    # A rotation is well-conditioned (κ = 1/2): twice the contract's 12 eps, for the methods without a limit.
+    assert_forward_error(rotation, batch, where, bound=16)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", [name for name, record in METHODS.items() if record.exact])
+def test_a_declared_limit_is_no_understatement(method, dtype):
+    """Beyond 16 times the declared limit an exact method does break the bound, or the limit is the whole range."""
+    record = METHODS[method]
+    eps = np.finfo(dtype).eps
+    beyond = 16 * max(record.condition_limit[dtype], 0.5)
+    if beyond >= 1 / (8 * eps):
+        return
+    batch = family_batch(dtype)
+    rotation = np.asarray(jax.jit(functools.partial(nearest_rotation, method=method))(batch.matrices))
+    where = resolved(batch) & ~(batch.condition < beyond)
+    where &= record.handles_inversion | (batch.singular_values[:, 2] > 0)
+    assert where.any()
+    with pytest.raises(AssertionError, match="forward error"):
+        assert_forward_error(rotation, batch, where)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("count", [32_769, 131_072])
+def test_large_batches_are_the_same_eager_and_jitted(method, dtype, count):
+    """On batches above 32,768 jaxlib 0.10.2 returns wrong numbers from some fused reductions (jax#39103)."""
+    random = np.random.default_rng(0)
+    matrices = random.uniform(-0.2, 0.2, (count, 3, 3)).astype(dtype) + np.eye(3, dtype=dtype)
+    eager = np.asarray(transformed(method, "eager")(matrices))
+    jitted = np.asarray(transformed(method, "jit")(matrices))
+    # κ ≤ 1 here; two roundings of the same algorithm may each be off by 16 eps, the torque iteration's by its angle.
+    tolerance = 64 * np.finfo(dtype).eps
+    assert np.abs(eager - jitted).max() <= tolerance
+    assert np.abs(jitted[:64] - np.asarray(transformed(method, "jit")(matrices[:64]))).max() <= tolerance
+
+
+def test_the_default_method_returns_rotations_for_random_bit_patterns():
+    random = np.random.default_rng(0)
+    for dtype, integer in (("float32", np.uint32), ("float64", np.uint64)):
+        bits = random.integers(0, np.iinfo(integer).max, (4096, 3, 3), dtype=integer, endpoint=True)
+        matrices = bits.view(dtype)
+        matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+        rotation = np.asarray(nearest_rotation(matrices))
+        assert_rotations(rotation, np.full(len(matrices), dtype))

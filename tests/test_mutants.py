@@ -1,0 +1,86 @@
+"""The suite catches what it is for: each mutant of the package fails the tests named beside it."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+from typing import NamedTuple
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parent.parent
+
+
+class Mutant(NamedTuple):
+    """A change of one line, and tests of which at least one must fail for it."""
+
+    file: str
+    original: str
+    mutated: str
+    tests: tuple[str, ...]
+
+
+MUTANTS = {
+    "sign of S": Mutant(
+        "_mat3.py",
+        "(b[0][1] + b[1][0]) * -0.5",
+        "(b[0][1] + b[1][0]) * 0.5",
+        ("test_derivative.py::test_the_derivative_of_each_order_is_that_of_the_lower_one",),
+    ),
+    "missing damping guard": Mutant(
+        "_derivative.py",
+        "_RESOLVED = 64",
+        "_RESOLVED = 0",
+        ("test_derivative.py::test_the_jacobian_is_finite_and_bounded_on_every_family[float64-forward]",),
+    ),
+    "missing scale guard": Mutant(
+        "_scaling.py",
+        "inverse = jnp.clip(mask - exponent, 1, mask - 1)",
+        "inverse = jnp.clip(0 * exponent + mask // 2, 1, mask - 1)",
+        ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[squaring-float64-jit]",),
+    ),
+    "raw solver in the rule": Mutant(
+        "_nearest.py",
+        "rotation = _nearest(matrix, method, damping, order + 1)",
+        "rotation = METHODS[method].solve(matrix)",
+        ("test_derivative.py::test_derivatives_of_every_order_are_finite_on_every_family",),
+    ),
+    "no reflection fix": Mutant(
+        "solvers/svd.py",
+        "right[..., 2:, :] * sign[..., None, None]",
+        "right[..., 2:, :]",
+        ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[svd-float64-jit]",),
+    ),
+    "torque without the absolute value": Mutant(
+        "steps/torque.py",
+        "jnp.abs(_mat3.trace(b)) + epsilon",
+        "_mat3.trace(b) + epsilon",
+        ("test_refine.py::test_the_torque_iteration_turns_the_right_way_beyond_a_right_angle",),
+    ),
+}
+
+
+@pytest.mark.parametrize("mutant", MUTANTS.values(), ids=MUTANTS.keys())
+def test_a_mutant_is_caught(mutant, tmp_path):
+    shutil.copytree(ROOT / "jaxrot", tmp_path / "jaxrot", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "tests", tmp_path / "tests", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    file = tmp_path / "jaxrot" / mutant.file
+    source = file.read_text()
+    assert source.count(mutant.original) == 1
+    file.write_text(source.replace(mutant.original, mutant.mutated))
+    tests = [str(tmp_path / "tests" / test) for test in mutant.tests]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider", *tests],
+        cwd=tmp_path,
+        env=environment | {"PYTHONPATH": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": str(ROOT / ".jax_cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    # 1: tests ran and some failed. Anything else, no test found for one, is no catch.
+    assert run.returncode == 1, run.stdout[-2000:]
+    assert "1 failed" in run.stdout
+    assert "ImportError" not in run.stdout

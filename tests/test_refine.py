@@ -1,0 +1,156 @@
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxrot import STEPS, nearest_rotation, refine_quaternion_wxyz, refine_rotation
+from jaxrot.families import half_turn_starts
+
+RANDOM = np.random.default_rng(0)
+
+
+def rotations(count):
+    return np.asarray(nearest_rotation(RANDOM.standard_normal((count, 3, 3))))
+
+
+def turned(axis, angle):
+    axis = np.asarray(axis) / np.linalg.norm(axis)
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_step_converges_to_the_nearest_rotation(step, dtype):
+    singular_values = np.array([[1, 0.9, 0.8], [1, 0.6, 0.3], [1, 0.7, -0.4], [1, 0.5, 0]])
+    left, right = rotations(4), rotations(4)
+    matrices = np.einsum("nij,nj,nkj->nik", left, singular_values, right).astype(dtype)
+    start = (left @ right.swapaxes(1, 2) @ turned([1, 2, 3], 0.5)).astype(dtype)
+    refined = refine_rotation(matrices, start, step=step, iterations=150)
+    assert refined.dtype == dtype
+    np.testing.assert_allclose(refined, nearest_rotation(matrices), atol=64 * np.finfo(dtype).eps)
+
+
+@pytest.mark.parametrize(
+    ("singular_values", "rate"),
+    [((1, 1, 1), 1 / 3), ((1, 0.5, 0.25), 0.571), ((1, 0.1, 0.01), 0.901), ((1, 0.5, -0.45), 0.952)],
+)
+def test_the_torque_step_is_linear_at_the_predicted_rate(singular_values, rate):
+    """Müller et al. 2016 do not state it: max|sᵢ| / |Σsᵢ|."""
+    matrix = np.diag(singular_values)
+    rotation = turned([1, 2, 3], 1e-3)
+    errors = []
+    for _ in range(12):
+        rotation = refine_rotation(matrix, rotation, iterations=1)
+        errors.append(np.linalg.norm(rotation - np.eye(3)))
+    assert errors[-1] / errors[-2] == pytest.approx(rate, rel=0.02)
+
+
+def test_more_iterations_are_the_same_as_repeated_calls():
+    matrices, start = RANDOM.standard_normal((5, 3, 3)), rotations(5)
+    repeated = start
+    for _ in range(3):
+        repeated = refine_rotation(matrices, repeated, iterations=1)
+    np.testing.assert_allclose(refine_rotation(matrices, start, iterations=3), repeated, atol=1e-14)
+
+
+def test_no_iterations_return_the_start():
+    start = rotations(5)
+    np.testing.assert_allclose(
+        refine_rotation(RANDOM.standard_normal((5, 3, 3)), start, iterations=0), start, atol=2e-15
+    )
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_what_the_matrix_does_not_determine_is_kept_from_the_start(step):
+    start = rotations(6)
+    np.testing.assert_allclose(refine_rotation(np.zeros((3, 3)), start, step=step), start, atol=2e-15)
+    # Rank 1: r1 turns to a1 in the plane of the two, and nothing else turns.
+    a1 = np.array([0.0, 0, 2])
+    refined = np.asarray(refine_rotation(np.outer(a1, [1, 0, 0]), start, step=step, iterations=200))
+    np.testing.assert_allclose(refined[:, :, 0], np.broadcast_to([0, 0, 1], (6, 3)), atol=1e-12)
+    for before, after in zip(start, refined, strict=True):
+        axis = np.cross(before[:, 0], [0, 0, 1])
+        angle = np.arctan2(np.linalg.norm(axis), before[2, 0])
+        np.testing.assert_allclose(after, turned(axis, angle) @ before, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("exponent", [-120, -60, 60, 120])
+def test_scale_changes_no_bit(step, exponent):
+    matrices, start = RANDOM.standard_normal((5, 3, 3)).astype(np.float32), rotations(5).astype(np.float32)
+    scaled = np.ldexp(matrices, exponent)
+    where = (np.abs(scaled) >= np.finfo(np.float32).tiny).all(axis=(1, 2))
+    assert where.any()
+    expected = np.asarray(refine_rotation(matrices, start, step=step))
+    np.testing.assert_array_equal(np.asarray(refine_rotation(scaled, start, step=step))[where], expected[where])
+
+
+def test_the_torque_iteration_stands_still_half_a_turn_off():
+    """As the paper's eq. (8) says; the three half turns are equilibria, saddles among them."""
+    starts = half_turn_starts(np.eye(3))[:3]
+    np.testing.assert_allclose(refine_rotation(np.diag([3.0, 2, 1]), starts, iterations=20), starts, atol=1e-15)
+
+
+def test_the_torque_iteration_turns_the_right_way_beyond_a_right_angle():
+    """The absolute value of the denominator: with a negative trace the torque still leads home."""
+    start = turned([1, 2, 3], 2.8)
+    assert np.trace(start) < 0
+    np.testing.assert_allclose(refine_rotation(np.eye(3), start, iterations=60), np.eye(3), atol=1e-14)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_the_result_is_a_scan_carry(dtype):
+    path = np.stack([turned([0, 0, 1], angle) @ np.diag([1, 0.8, 0.5]) for angle in np.linspace(0, 2, 50)]).astype(
+        dtype
+    )
+
+    def frame(rotation, matrix):
+        rotation = refine_rotation(matrix, rotation, iterations=4)
+        return rotation, rotation
+
+    _, followed = jax.jit(lambda start, path: jax.lax.scan(frame, start, path))(jnp.eye(3, dtype=dtype), path)
+    assert followed.dtype == dtype
+    np.testing.assert_allclose(followed, nearest_rotation(path), atol=2e-2)
+
+
+def test_the_sign_of_a_quaternion_is_continuous():
+    refine = jax.jit(functools.partial(refine_quaternion_wxyz, iterations=6))
+    quaternion = jnp.asarray([1.0, 0, 0, 0])
+    for angle in np.linspace(0, 4 * np.pi, 200):
+        following = refine(turned([0, 0, 1], angle), quaternion)
+        assert following @ quaternion > 0.9
+        quaternion = following
+    np.testing.assert_allclose(quaternion, [1, 0, 0, 0], atol=1e-3)
+
+
+def test_batches_broadcast():
+    matrices, start = RANDOM.standard_normal((5, 3, 3)), rotations(2)
+    refined = refine_rotation(matrices[:, None], start, iterations=2)
+    assert refined.shape == (5, 2, 3, 3)
+    np.testing.assert_allclose(refined[3, 1], refine_rotation(matrices[3], start[1], iterations=2), atol=1e-15)
+
+
+def test_the_derivative_is_implicit_and_forgets_the_start():
+    matrix, start = np.diag([1.0, 0.9, 0.8]) + 0.1 * RANDOM.standard_normal((3, 3)), rotations(1)[0]
+    forward = jax.jacfwd(refine_rotation, argnums=(0, 1))(matrix, start)
+    by_iteration, by_start = jax.jacrev(lambda a, q: refine_rotation(a, q, iterations=100), argnums=(0, 1))(
+        matrix, start
+    )
+    np.testing.assert_allclose(by_iteration, jax.jacrev(nearest_rotation)(matrix), atol=1e-13)
+    np.testing.assert_array_equal(by_start, np.zeros((3, 3, 3, 3)))
+    np.testing.assert_array_equal(forward[1], np.zeros((3, 3, 3, 3)))
+
+
+def test_the_quaternion_has_the_derivative_of_the_rotation():
+    matrix = np.diag([1.0, 0.9, 0.8]) + 0.1 * RANDOM.standard_normal((3, 3))
+    function = lambda a: refine_quaternion_wxyz(a, np.eye(4)[0], iterations=60)  # noqa: E731
+    jacobian = np.asarray(jax.jacrev(function)(matrix))
+    h = 1e-6
+    for entry in range(9):
+        step = h * np.eye(9)[entry].reshape(3, 3)
+        difference = (np.asarray(function(matrix + step)) - np.asarray(function(matrix - step))) / (2 * h)
+        np.testing.assert_allclose(jacobian.reshape(4, 9)[:, entry], difference, atol=1e-9)
