@@ -1,0 +1,129 @@
+"""The real input that ships with the report: shape-matching matrices of the Stanford dragon, treated badly.
+
+Source: Müller et al. 2016, section 4 and Fig. 7 (clustered shape matching of this model); the vertices and their
+acknowledgement are in `dragon.npz` and `dragon.txt`.
+"""
+
+import itertools
+from collections.abc import Iterator
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+
+NAME = "Stanford dragon"
+CLUSTER_SIZE = 32
+
+
+class Stage(NamedTuple):
+    """One deformation of the dragon.
+
+    Attributes:
+        name: The set under which the report counts this stage; several stages may share it.
+        vertices: The deformed vertices, float64 of shape (n, 3).
+    """
+
+    name: str
+    vertices: np.ndarray
+
+
+def rest_vertices() -> np.ndarray:
+    """The vertices at rest, centred and one unit high: float64 of shape (5205, 3), the second axis points up."""
+    with resources.files("jaxrot.report").joinpath("dragon.npz").open("rb") as file, np.load(file) as archive:
+        vertices = archive["vertices"].astype(np.float64)
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    return (vertices - (lower + upper) / 2) / (upper[1] - lower[1])
+
+
+def overlapping_clusters(vertices: np.ndarray, count: int, size: int = CLUSTER_SIZE) -> np.ndarray:
+    """Clusters that cover the shape evenly and share vertices.
+
+    The seeds are farthest points: each lies as far as possible from those before it. A cluster is the `size` vertices
+    nearest to its seed.
+
+    Args:
+        vertices: Shape (n, 3).
+        count: Number of clusters, at most n.
+        size: Vertices in a cluster, at most n.
+
+    Returns:
+        Vertex indices of shape (count, size), the nearest first.
+    """
+    clusters = np.empty((count, size), dtype=np.intp)
+    distance_to_seeds = np.full(len(vertices), np.inf)
+    seed = 0
+    for row in range(count):
+        distance = np.sum((vertices - vertices[seed]) ** 2, axis=1)
+        nearest = np.argpartition(distance, size - 1)[:size]
+        clusters[row] = nearest[np.argsort(distance[nearest], kind="stable")]
+        distance_to_seeds = np.minimum(distance_to_seeds, distance)
+        seed = int(np.argmax(distance_to_seeds))
+    return clusters
+
+
+def twisted(vertices: np.ndarray, angle: float) -> np.ndarray:
+    """The shape turned about the vertical, `angle` radians more at the top than at the bottom."""
+    x, y, z = vertices.T
+    cosine, sine = np.cos(angle * y), np.sin(angle * y)
+    return np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=1)
+
+
+def bent(vertices: np.ndarray, angle: float) -> np.ndarray:
+    """The shape rolled up in its front plane, so that its two ends point `angle` radians apart."""
+    x, y, z = vertices.T
+    curvature = angle / np.ptp(x)
+    radius = 1 / curvature - y
+    return np.stack([radius * np.sin(curvature * x), 1 / curvature - radius * np.cos(curvature * x), z], axis=1)
+
+
+def squashed(vertices: np.ndarray, height: float) -> np.ndarray:
+    """The shape pressed to `height` of its height: 0 is flat, negative is turned inside out."""
+    return vertices * np.array([1.0, height, 1.0])
+
+
+def scrambled(vertices: np.ndarray, seed: int) -> np.ndarray:
+    """Every vertex anywhere in the bounding box."""
+    return np.random.default_rng(seed).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
+
+
+def stages(vertices: np.ndarray, seed: int = 0) -> Iterator[Stage]:
+    """The dragon at rest and in every deformation of the report."""
+    yield Stage("at rest", vertices)
+    for angle in (0.5, 2.0, 6.0):
+        yield Stage("twisted", twisted(vertices, angle))
+    for angle in (1.0, 4.0):
+        yield Stage("bent", bent(vertices, angle))
+    for height in (0.5, 0.1, 0.01):
+        yield Stage("squashed", squashed(vertices, height))
+    yield Stage("flat", squashed(vertices, 0.0))
+    for height in (-0.01, -0.1, -0.5, -1.0):
+        yield Stage("inverted", squashed(vertices, height))
+    yield Stage("scrambled", scrambled(vertices, seed))
+
+
+def cluster_matrices(current: np.ndarray, rest: np.ndarray, clusters: np.ndarray) -> np.ndarray:
+    """A_pq = Σ m (x − x̄)(q − q̄)ᵀ of every cluster, each of mass one.
+
+    Args:
+        current: Current vertices x, shape (n, 3).
+        rest: The same vertices q at rest, shape (n, 3).
+        clusters: Vertex indices of shape (count, size).
+
+    Returns:
+        Shape (count, 3, 3).
+    """
+    x, q = current[clusters], rest[clusters]
+    x = x - x.mean(axis=1, keepdims=True)
+    q = q - q.mean(axis=1, keepdims=True)
+    return np.einsum("cki,ckj->cij", x, q) / clusters.shape[1]
+
+
+def dragon_matrices(cluster_count: int) -> dict[str, np.ndarray]:
+    """The matrices of every cluster at every stage, float64, by the name of the stage."""
+    rest = rest_vertices()
+    clusters = overlapping_clusters(rest, cluster_count)
+    by_name = itertools.groupby(stages(rest), key=lambda stage: stage.name)
+    return {
+        name: np.concatenate([cluster_matrices(stage.vertices, rest, clusters) for stage in group])
+        for name, group in by_name
+    }

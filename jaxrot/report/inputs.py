@@ -1,0 +1,109 @@
+"""What the report measures on: the dragon, or the user's own file, as named sets of matrices."""
+
+import zlib
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+
+from jaxrot.report import dragon
+from jaxrot.report.errors import ReportError
+
+EXPECTED = "expected a .npy or .npz file with a real array of shape (..., 3, 3)"
+
+
+class Input(NamedTuple):
+    """The matrices of one report.
+
+    Attributes:
+        name: What the report calls them.
+        sets: Named parts, each float64 of shape (n, 3, 3), n > 0.
+        remarks: What the reader must know about how they were read, one sentence each.
+    """
+
+    name: str
+    sets: dict[str, np.ndarray]
+    remarks: tuple[str, ...] = ()
+
+
+def dragon_input(cluster_count: int) -> Input:
+    """The input that ships with the report."""
+    remark = (
+        f"A_pq of {cluster_count} overlapping clusters of {dragon.CLUSTER_SIZE} vertices in each of 15 deformations of"
+        " the dragon (source: Stanford University Computer Graphics Laboratory)."
+    )
+    return Input(dragon.NAME, dragon.dragon_matrices(cluster_count), (remark,))
+
+
+def read_input(path: Path) -> Input:
+    """Reads the user's own matrices.
+
+    Every array of shape (..., 3, 3) in an archive becomes a set of its own; what else the archive holds is left out and
+    said so.
+
+    Raises:
+        ReportError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
+            non-empty array of shape (..., 3, 3).
+    """
+    if not path.is_file():
+        raise ReportError(f"--input {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
+    arrays = _load(path)
+    if isinstance(arrays, np.ndarray):
+        if (problem := _problem(arrays)) is not None:
+            raise ReportError(f"--input {path}: {problem}; {EXPECTED}")
+        return Input(path.name, {path.stem: _flat(arrays)})
+    problems = {name: _problem(array) for name, array in arrays.items()}
+    sets = {name: _flat(arrays[name]) for name, problem in problems.items() if problem is None}
+    left_out = [f"{name} ({problem})" for name, problem in problems.items() if problem is not None]
+    if not sets:
+        held = ", ".join(left_out) if left_out else "nothing"
+        raise ReportError(f"--input {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
+    remarks = (f"Left out of the file: {', '.join(left_out)}.",) if left_out else ()
+    return Input(path.name, sets, remarks)
+
+
+def thinned(given: Input, most: int) -> Input:
+    """At most about `most` matrices, drawn at random from every set alike: the reference is slow."""
+    total = sum(map(len, given.sets.values()))
+    if total <= most:
+        return given
+    random = np.random.default_rng(0)
+    sets = {}
+    for name, part in given.sets.items():
+        count = max(1, len(part) * most // total)
+        sets[name] = part[np.sort(random.choice(len(part), count, replace=False))]
+    kept = sum(map(len, sets.values()))
+    remark = f"A random sample: {kept:,} of the {total:,} matrices in the file."
+    return Input(given.name, sets, (*given.remarks, remark))
+
+
+def _load(path: Path) -> np.ndarray | dict[str, np.ndarray]:
+    # Pickle would run code out of the file; an object array is refused instead. The file is opened here because
+    # `np.load` leaves that of a torn archive open.
+    try:
+        with path.open("rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            return loaded if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
+    except (OSError, ValueError, EOFError, SyntaxError, RuntimeError, MemoryError, BadZipFile, zlib.error) as error:
+        reason = " ".join(str(error).split())
+        if "allow_pickle" in reason or "pickled" in reason:
+            reason = "it holds Python objects or is no NumPy file"
+        raise ReportError(f"--input {path}: cannot be read ({reason}); {EXPECTED}") from None
+
+
+def _problem(array: np.ndarray) -> str | None:
+    """Why an array cannot be measured on, or None."""
+    if not isinstance(array, np.ndarray):
+        return "no NumPy array"
+    if array.shape[-2:] != (3, 3):
+        return f"shape {array.shape}"
+    if array.dtype.kind not in "fiub":
+        return f"dtype {array.dtype}"
+    if array.size == 0:
+        return f"empty, shape {array.shape}"
+    return None
+
+
+def _flat(array: np.ndarray) -> np.ndarray:
+    return array.astype(np.float64).reshape(-1, 3, 3)

@@ -1,0 +1,64 @@
+"""The matrices that every method is judged on, with everything about them that does not depend on the method."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxrot.report import reference
+
+
+class Judged(NamedTuple):
+    """One batch of matrices in one dtype. Everything has one entry a matrix.
+
+    Attributes:
+        matrices: Shape (n, 3, 3), float32 or float64.
+        sets: The named parts of the batch; they may overlap.
+        solution: Nearest rotation and signed singular values in the reference's wider dtype; NaN where not finite.
+        condition: κ = s1/(s2+s3); inf where R is not unique, NaN where not finite.
+        size: ‖A‖_F/√3, which is 1 for a rotation.
+        is_inverted: det A < 0.
+        is_finite: No NaN and no infinity in the matrix.
+        is_normal: Flushing subnormal entries to zero, as XLA on CPU does, would not change R beyond eps.
+    """
+
+    matrices: np.ndarray
+    sets: dict[str, slice]
+    solution: reference.Reference
+    condition: np.ndarray
+    size: np.ndarray
+    is_inverted: np.ndarray
+    is_finite: np.ndarray
+    is_normal: np.ndarray
+
+
+def judge(sets: Mapping[str, np.ndarray], dtype: str, whole: str | None = None) -> Judged:
+    """Rounds the matrices to a dtype, lays them into one batch and finds their nearest rotations.
+
+    Args:
+        sets: Arrays of shape (n, 3, 3) by name. Rounding to float32 may overflow to infinity; that is counted.
+        dtype: "float32" or "float64".
+        whole: A name for all of them together, or None.
+    """
+    with np.errstate(over="ignore", under="ignore"):
+        parts = [array.astype(dtype) for array in sets.values()]
+    matrices = np.concatenate(parts)
+    ends = np.cumsum([len(part) for part in parts]).tolist()
+    slices = {name: slice(end - len(part), end) for name, part, end in zip(sets, parts, ends, strict=True)}
+    if whole is not None:
+        slices = {whole: slice(0, len(matrices))} | slices
+    solution = reference.solve(matrices)
+    magnitude = np.abs(matrices)
+    largest = magnitude.max(axis=(1, 2))
+    limits = np.finfo(dtype)
+    is_subnormal = ((magnitude != 0) & (magnitude < limits.smallest_normal)).any(axis=(1, 2))
+    return Judged(
+        matrices=matrices,
+        sets=slices,
+        solution=solution,
+        condition=reference.condition(matrices, reference=solution),
+        size=np.sqrt(np.mean(solution.singular_values**2, axis=1)),
+        is_inverted=solution.singular_values[:, 2] < 0,
+        is_finite=np.all(np.isfinite(matrices), axis=(1, 2)),
+        is_normal=~is_subnormal | (largest >= limits.smallest_normal / limits.eps),
+    )

@@ -1,0 +1,172 @@
+"""The picture of the report: error against time, and which methods nothing else beats in both."""
+
+import io
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxrot.report.labels import place_labels
+
+# Okabe and Ito's colours, told apart without seeing red or green; shape and filling tell the kinds apart in grey too.
+_EXACT = {"color": "#0072B2", "marker": "o"}
+_APPROXIMATION = {"color": "#D55E00", "marker": "^"}
+_FRONT_COLOR = "#009E73"
+# ‖R - R*‖_F is at most 2√2 between rotations; what is no number is drawn there.
+_LARGEST_ERROR = 8**0.5
+
+
+class Point(NamedTuple):
+    """One method in the picture.
+
+    Attributes:
+        name: Its label.
+        time_ns: Median time a matrix.
+        error: The error that places it: the 99th percentile.
+        error_median: Lower end of its whisker.
+        error_max: Upper end.
+        is_exact: The method computes the nearest rotation and not something near it.
+    """
+
+    name: str
+    time_ns: float
+    error: float
+    error_median: float
+    error_max: float
+    is_exact: bool
+
+
+class Panel(NamedTuple):
+    """One dtype.
+
+    Attributes:
+        dtype: "float32" or "float64".
+        batch: The batch size of the times.
+        points: The methods.
+    """
+
+    dtype: str
+    batch: int
+    points: Sequence[Point]
+
+
+def pareto_front(points: Sequence[Point]) -> list[Point]:
+    """The points that no other beats: none is at least as fast and as accurate, and better in one. Fastest first."""
+    front: list[Point] = []
+    for point in sorted(points, key=lambda point: (point.time_ns, point.error)):
+        is_twin = bool(front) and (point.time_ns, point.error) == (front[-1].time_ns, front[-1].error)
+        if not front or point.error < front[-1].error or is_twin:
+            front.append(point)
+    return front
+
+
+def draw_pareto(panels: Sequence[Panel], title: str) -> bytes:
+    """The picture as PNG, one panel a dtype."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    # Not pyplot: it would pick a display and keep the figure for the whole process.
+    figure = Figure(figsize=(1.5 + 5.7 * len(panels), 5.8), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    figure.suptitle(title, fontsize=11)
+    for axes, panel in zip(all_axes, panels, strict=True):
+        _draw_panel(axes, panel)
+    _draw_legend(figure, panels)
+    figure.canvas.draw()
+    # From here the layout must hold still: a label is placed where its neighbours are drawn.
+    figure.set_layout_engine("none")
+    for axes, panel in zip(all_axes, panels, strict=True):
+        floor = _floor(panel.dtype)
+        labels = [
+            (point.name if np.isfinite(point.error_max) else f"{point.name} (NaN)", point.time_ns, y)
+            for point in panel.points
+            for y in [_clip(point.error, floor)]
+        ]
+        whiskers = [
+            (point.time_ns, _clip(error, floor))
+            for point in panel.points
+            for error in np.geomspace(_clip(point.error_median, floor), _clip(point.error_max, floor), 12)
+        ]
+        place_labels(axes, labels, whiskers + _front_line(panel, floor))
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
+
+
+def _front_line(panel: Panel, floor: float) -> list[tuple[float, float]]:
+    """Places along the drawn front, close enough together that no word fits between."""
+    front = [(point.time_ns, _clip(point.error, floor)) for point in pareto_front(panel.points)]
+    line = []
+    for (x, y), (next_x, next_y) in itertools.pairwise(front):
+        line += [(place, y) for place in np.geomspace(x, next_x, 60).tolist()]
+        line += [(next_x, place) for place in np.geomspace(y, next_y, 60).tolist()]
+    return line
+
+
+def _draw_panel(axes: Any, panel: Panel) -> None:
+    eps, floor = np.finfo(panel.dtype).eps, _floor(panel.dtype)
+    front = pareto_front(panel.points)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.axhline(eps, color="0.6", linewidth=0.8, linestyle=":")
+    axes.annotate(
+        f"eps = {eps:.1e}", (1, eps), xycoords=("axes fraction", "data"), xytext=(-3, 2), textcoords="offset points",
+        ha="right", va="bottom", fontsize=7, color="0.4",
+    )  # fmt: skip
+    axes.plot(
+        [point.time_ns for point in front], [_clip(point.error, floor) for point in front],
+        color=_FRONT_COLOR, linewidth=2, alpha=0.6, zorder=1, drawstyle="steps-post",
+    )  # fmt: skip
+    for point in panel.points:
+        style = _EXACT if point.is_exact else _APPROXIMATION
+        ends = [_clip(point.error_median, floor), _clip(point.error_max, floor)]
+        axes.plot([point.time_ns] * 2, ends, color=style["color"], linewidth=1, alpha=0.5, zorder=2)
+        axes.plot(
+            point.time_ns, _clip(point.error, floor), linestyle="none", markersize=8, zorder=3,
+            markerfacecolor=style["color"] if point in front else "white", markeredgecolor=style["color"],
+            marker=style["marker"],
+        )  # fmt: skip
+    # Room for labels beside the outermost points.
+    times = [point.time_ns for point in panel.points]
+    axes.set_xlim(min(times) / 2.2, max(times) * 2.2)
+    lower, upper = axes.get_ylim()
+    axes.set_ylim(lower / 2, upper * 2)
+    axes.grid(True, which="major", color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.set_title(f"{panel.dtype}, batch {panel.batch:,}", fontsize=10)
+    axes.set_xlabel("time a matrix [ns], median")
+    axes.set_ylabel("forward error ‖R - R*‖$_F$, 99th percentile")
+
+
+def _draw_legend(figure: Any, panels: Sequence[Panel]) -> None:
+    from matplotlib.lines import Line2D
+
+    points = [point for panel in panels for point in panel.points]
+    handles = []
+    for style, is_exact, name in ((_EXACT, True, "exact method"), (_APPROXIMATION, False, "approximation")):
+        if any(point.is_exact == is_exact for point in points):
+            handles.append(
+                Line2D([], [], linestyle="none", markersize=8, label=name, color=style["color"], marker=style["marker"])
+            )
+    handles.append(
+        Line2D([], [], linestyle="none", markersize=8, marker="o", color="0.3", markerfacecolor="white",
+               label="hollow: another is faster and more accurate")
+    )  # fmt: skip
+    handles.append(Line2D([], [], color=_FRONT_COLOR, linewidth=2, alpha=0.6, label="Pareto front"))
+    handles.append(Line2D([], [], color="0.3", linewidth=1, label="from median to largest error"))
+    if any(point.error_median < _floor(panel.dtype) for panel in panels for point in panel.points):
+        handles.append(Line2D([], [], linestyle="none", label="errors below eps/10 are drawn there"))
+    if any(not np.isfinite(point.error_max) for panel in panels for point in panel.points):
+        handles.append(Line2D([], [], linestyle="none", label="(NaN): some results are no numbers, drawn at 2√2"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+
+
+def _floor(dtype: str) -> float:
+    """Where an error of zero is drawn."""
+    return float(np.finfo(dtype).eps) / 10
+
+
+def _clip(error: float, floor: float) -> float:
+    return min(max(error, floor), _LARGEST_ERROR)

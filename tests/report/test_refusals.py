@@ -1,0 +1,149 @@
+"""What the command refuses: in one line, with status 2, and before it writes anything."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from jaxrot.__main__ import main
+from jaxrot.report import command, measurement, render
+
+
+def _save_text(path):
+    path.write_text("1 2 3\n")
+
+
+def _save_objects(path):
+    with path.open("wb") as file:
+        np.save(file, np.array([[{}]], dtype=object), allow_pickle=True)
+
+
+def _save(array):
+    def save(path):
+        with path.open("wb") as file:
+            np.save(file, array)
+
+    return save
+
+
+def _save_archive(**arrays):
+    def save(path):
+        with path.open("wb") as file:
+            np.savez(file, **arrays)
+
+    return save
+
+
+def _save_torn_archive(path):
+    _save_archive(a=np.ones((100, 3, 3)))(path)
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+BAD_FILES = {
+    "missing": (lambda path: None, "no such file"),
+    "folder": (lambda path: path.mkdir(), "not a file"),
+    "text": (_save_text, "cannot be read"),
+    "empty_file": (lambda path: path.touch(), "cannot be read"),
+    "wrong_shape": (_save(np.ones((3, 4))), "shape (3, 4)"),
+    "trailing_batch": (_save(np.ones((3, 3, 7))), "shape (3, 3, 7)"),
+    "scalar": (_save(np.float64(1)), "shape ()"),
+    "complex": (_save(np.ones((3, 3), complex)), "complex128"),
+    "words": (_save(np.full((3, 3), "a")), "<U1"),
+    "dates": (_save(np.full((3, 3), "2020-01-01", "datetime64[D]")), "datetime64"),
+    "objects": (_save_objects, "Python objects"),
+    "empty": (_save(np.ones((0, 3, 3))), "empty"),
+    "archive_without": (_save_archive(a=np.ones(3), b=np.ones((2, 2))), "no array of shape (..., 3, 3)"),
+    "archive_of_nothing": (_save_archive(), "no array of shape (..., 3, 3)"),
+    "torn_archive": (_save_torn_archive, "cannot be read"),
+}
+
+
+def _refused(words, capsys):
+    """What the command says on stderr when it exits with status 2."""
+    try:
+        status = main([str(word) for word in words])
+    except SystemExit as error:
+        status = error.code
+    shown = capsys.readouterr()
+    assert status == 2
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1, shown.err
+    assert shown.err.endswith("\n")
+    assert "Traceback" not in shown.err
+    return shown.err
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
+    save, expected = BAD_FILES[kind]
+    save(tmp_path / "bad.npy")
+    text = _refused(["report", "--input", tmp_path / "bad.npy", "--out", tmp_path / "out"], capsys)
+    assert expected in text
+    assert "expected a .npy or .npz file with a real array of shape (..., 3, 3)" in text
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--methods", "svd,svdd"], "unknown 'svdd'; expected some of svd,"),
+        (["--methods", ""], "unknown ''"),
+        (["--dtype", "float16"], "expected one of float32, float64, both"),
+        (["--batch", "10,x"], "expected whole numbers from 1"),
+        (["--batch", "0"], "expected whole numbers from 1"),
+        (["--batch", "-5"], "expected whole numbers from 1"),
+        (["--batch", "100000000000"], "expected whole numbers from 1"),
+        (["--batch", ""], "expected whole numbers from 1"),
+        (["--no-such-option"], "unrecognized arguments: --no-such-option"),
+        (["--methods"], "expected one argument"),
+    ],
+)
+def test_a_bad_option_is_refused_in_one_line(words, expected, tmp_path, capsys):
+    assert expected in _refused(["report", "--out", tmp_path / "out", *words], capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_command_is_refused_in_one_line(capsys):
+    assert "required: COMMAND" in _refused([], capsys)
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "file/far/below"])
+def test_a_file_in_the_way_of_out_is_refused(place, tmp_path, capsys):
+    (tmp_path / "file").write_text("precious")
+    text = _refused(["report", "--out", tmp_path / place], capsys)
+    assert "expected a folder, or a name for a new one" in text
+    assert (tmp_path / "file").read_text() == "precious"
+
+
+def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, capsys, monkeypatch):
+    def refuse(*arguments, **options):
+        raise PermissionError(13, "Permission denied")
+
+    # Permission bits do not stop an administrator, and the tests may be run by one.
+    monkeypatch.setattr("jaxrot.report.output.tempfile.mkdtemp", refuse)
+    monkeypatch.setattr(command, "measure", lambda *arguments: pytest.fail("measured"))
+    assert "permission denied" in _refused(["report", "--out", tmp_path / "out"], capsys)
+
+
+def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(command, "measure", lambda *arguments: measurement.Results([], [], ()))
+    for name in ("as_report_markdown", "as_terminal_text", "as_json"):
+        monkeypatch.setattr(render, name, lambda *arguments: "text")
+    monkeypatch.setattr(command, "_picture", lambda *arguments: b"picture")
+
+    def fail(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("jaxrot.report.output.Path.rename", fail)
+    text = _refused(["report", "--out", tmp_path / "out", "--methods", "svd"], capsys)
+    assert "no space left on device" in text
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_a_missing_extra_is_named_with_what_brings_it(is_terminal, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(command.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
+    text = _refused(["report", "--out", tmp_path / "out"], capsys)
+    assert "pip install 'jaxrot[report]'" in text
+    assert ("tqdm" in text) == is_terminal
