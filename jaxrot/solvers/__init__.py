@@ -17,8 +17,10 @@ class Method(NamedTuple):
         exact: It computes the nearest rotation to rounding, not an approximation of it.
         handles_inversion: Right for det A < 0 too.
         scale_free: Right at every scale, from the smallest normal numbers to the largest.
-        condition_limit: By dtype, the largest κ = s1/(s2+s3) up to which it keeps the forward error within
-            8 eps (1+κ), measured over the families that the flags admit; 0: not even at κ = 1/2, a rotation's.
+        condition_limit: By dtype, the largest κ = s1/(s2+s3), a power of two, up to which it keeps the numerical
+            contract of the default method (forward error 8 eps (1+κ), orthogonality 10 eps, lost trace 16 eps s1,
+            torque 128 eps s1), measured over all families that the flags admit; 0: not even near κ = 1/2, a
+            rotation's.
         source: Where it is from.
     """
 
@@ -39,14 +41,14 @@ DEFAULT_METHOD = "squaring"
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "svd": Method(svd.solve, True, True, True, _limit(32, 0), "LAPACK; Kabsch 1976"),
+        "svd": Method(svd.solve, True, True, True, _limit(0, 0), "LAPACK; Kabsch 1976"),
         "davenport": Method(davenport.solve, True, True, True, _limit(2, 0), "Davenport's q-method; Horn 1987"),
         "smith_franca": Method(smith_franca.solve, True, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (16)"),
         "quaternion_average": Method(
             quaternion_average.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (30)"
         ),
         "cayley": Method(cayley.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (31)"),
-        "foam": Method(foam.solve, True, True, True, _limit(2, 2), "Markley 1993"),
+        "foam": Method(foam.solve, True, True, True, _limit(1, 1), "Markley 1993"),
         "squaring": Method(squaring.solve, True, True, True, _limit(2.0**20, 2.0**49), "Wu et al. 2018 (FA3R)"),
         "torque": Method(torque.solve, False, True, True, _limit(0, 0), "Müller et al. 2016, section 3"),
     }
