@@ -3,22 +3,22 @@
 import doctest
 import pathlib
 import re
-
-import numpy as np
+import subprocess
+import sys
 
 from jaxrot import METHODS, STEPS
 
-README = (pathlib.Path(__file__).parent.parent / "README.md").read_text()
+ROOT = pathlib.Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
 
 
 def test_the_code_in_the_readme_does_what_it_says():
-    # The README is written for a fresh interpreter; under the suite's x64 its float32 is asked for by name.
-    with np.printoptions(precision=3, suppress=True):
-        test = doctest.DocTestParser().get_doctest(README, {}, "README.md", "README.md", 0)
-        runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
-        runner.run(test)
-    assert runner.failures == 0
-    assert len(test.examples) >= 10
+    assert len(doctest.DocTestParser().get_examples(README)) >= 12
+    # In an interpreter of its own: as a newcomer pastes it, without this suite's settings.
+    run = subprocess.run(
+        [sys.executable, "-m", "doctest", "README.md"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stdout
 
 
 def test_the_readme_has_one_command_for_the_report_and_one_for_the_tests():
@@ -35,4 +35,4 @@ def test_the_tables_name_every_method_and_step():
 
 def test_its_pictures_exist():
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", README):
-        assert (pathlib.Path(__file__).parent.parent / picture).exists()
+        assert (ROOT / picture).exists()
