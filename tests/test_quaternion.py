@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from certificate import assert_within, family_batch
 
 from jaxrot import _mat3, _quaternion, nearest_quaternion_wxyz, nearest_rotation
 
@@ -128,6 +129,18 @@ def test_the_nearest_quaternion_is_that_of_the_nearest_rotation():
     assert (quaternion[:, 0] >= 0).all()
     np.testing.assert_allclose(np.linalg.norm(quaternion, axis=-1), 1, atol=4e-16)
     np.testing.assert_allclose(to_matrix(quaternion), nearest_rotation(matrices), atol=4e-15)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_the_nearest_quaternion_is_that_of_the_nearest_rotation_on_every_family(dtype):
+    """Jitted: where a choice, of a column or of a sign, hangs on rounding, all components must choose alike."""
+    batch = family_batch(dtype)
+    quaternion = np.asarray(jax.jit(nearest_quaternion_wxyz)(batch.matrices))
+    eps = np.finfo(dtype).eps
+    assert (quaternion[:, 0] >= 0).all()
+    assert_within(np.abs(np.linalg.norm(quaternion.astype(float), axis=-1) - 1), 4 * eps, batch.families, "unit length")
+    difference = to_matrix(quaternion.astype(float)) - np.asarray(jax.jit(nearest_rotation)(batch.matrices))
+    assert_within(np.abs(difference).max((1, 2)), 16 * eps, batch.families, "the rotation of the quaternion")
 
 
 def test_the_nearest_quaternion_is_differentiable():
