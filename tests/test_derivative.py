@@ -132,6 +132,13 @@ def test_every_method_has_the_same_derivative_at_a_rotation(method):
     np.testing.assert_allclose(np.asarray(jacobian).reshape(9, 9), analytic_jacobian(np.eye(3)), atol=1e-13)
 
 
+@pytest.mark.parametrize("method", ["svd", "davenport"])
+def test_the_second_derivative_is_of_the_rule_and_not_of_the_method(method):
+    """At equal singular values the derivative of LAPACK's vectors is NaN, and the rule's is exact."""
+    hessian = jax.jacfwd(jax.jacrev(functools.partial(nearest_rotation, method=method)))(np.eye(3))
+    np.testing.assert_allclose(hessian, jax.jacfwd(jax.jacrev(nearest_rotation))(np.eye(3)), atol=1e-13)
+
+
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("exponent", [-60, 60])
 def test_the_derivative_is_scale_free_bit_for_bit(dtype, exponent):
