@@ -131,3 +131,14 @@ def check_damping(damping: float) -> float:
     if not (np.isfinite(damping) and damping >= 0):
         raise ValueError(f"damping must be finite and >= 0; got {damping}")
     return float(damping)
+
+
+def check_flag(flag: bool, name: str) -> bool:
+    """Admits a static yes or no.
+
+    Raises:
+        TypeError: It is no Python bool (a traced value included: it decides what is computed).
+    """
+    if not isinstance(flag, bool | np.bool_):
+        raise TypeError(f"{name} must be a static Python bool; got {type(flag).__name__}")
+    return bool(flag)

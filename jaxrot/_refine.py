@@ -7,13 +7,16 @@ from jax.typing import ArrayLike
 
 from jaxrot import _mat3, _quaternion
 from jaxrot._derivative import angular_tangent
-from jaxrot._inputs import check_choice, check_iterations, check_matrix, check_start
+from jaxrot._inputs import check_choice, check_flag, check_iterations, check_matrix, check_start
 from jaxrot._scaling import scaled
 from jaxrot.steps import STEPS
+from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
 
 
-def refine_rotation(matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torque", iterations: int = 3) -> jax.Array:
+def refine_rotation(
+    matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torque", iterations: int = 3, escape: bool = False
+) -> jax.Array:
     """Moves a rotation towards the one nearest to a 3×3 matrix, by a fixed number of steps.
 
     Each step increases tr(RᵀA) towards its maximum over the rotations. Made for simulations: the rotation of the last
@@ -25,6 +28,8 @@ def refine_rotation(matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torq
         rotation: The start, shape (..., 3, 3); its batch axes broadcast against those of `matrix`.
         step: A name in `STEPS`. Static.
         iterations: How many steps, ≥ 0. Static.
+        escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
+            about nine torque steps, and nothing when it is off.
 
     Returns:
         A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`. With
@@ -32,10 +37,11 @@ def refine_rotation(matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torq
 
     Raises:
         ValueError: Wrong shape, unknown step, negative iterations.
-        TypeError: Complex or non-numeric arrays, traced step or iterations.
+        TypeError: Complex or non-numeric arrays, traced step, iterations or escape.
 
     Uniqueness:
-        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) `torque` stands still.
+        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) `torque` stands still,
+        unless `escape` is on.
 
     Derivative:
         The implicit rule of `nearest_rotation`, at the rotation that was reached: right at convergence, and zero with
@@ -46,12 +52,17 @@ def refine_rotation(matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torq
     checked = check_matrix(matrix)
     start = check_start(rotation, "rotation", (3, 3), checked.value).value
     quaternion = _quaternion.stack(_quaternion.from_rotation(_mat3.components(start)))
-    refined = _refine(checked.value, quaternion, step, iterations)
+    refined = _refine(checked.value, quaternion, step, iterations, escape)
     return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined))).astype(checked.dtype)
 
 
 def refine_quaternion_wxyz(
-    matrix: ArrayLike, quaternion_wxyz: ArrayLike, *, step: str = "torque", iterations: int = 3
+    matrix: ArrayLike,
+    quaternion_wxyz: ArrayLike,
+    *,
+    step: str = "torque",
+    iterations: int = 3,
+    escape: bool = False,
 ) -> jax.Array:
     """Moves a quaternion (w, x, y, z) towards the rotation nearest to a 3×3 matrix; see `refine_rotation`.
 
@@ -61,6 +72,8 @@ def refine_quaternion_wxyz(
             those of `matrix`.
         step: A name in `STEPS`. Static.
         iterations: How many steps, ≥ 0. Static.
+        escape: Leave an equilibrium that is not nearest, before the first step; the sign of a start that is turned is
+            free. Static.
 
     Returns:
         A unit quaternion, shape (..., 4) of the broadcast batch, dtype of `matrix`. Its sign continues that of the
@@ -68,7 +81,7 @@ def refine_quaternion_wxyz(
 
     Raises:
         ValueError: Wrong shape, unknown step, negative iterations.
-        TypeError: Complex or non-numeric arrays, traced step or iterations.
+        TypeError: Complex or non-numeric arrays, traced step, iterations or escape.
 
     Uniqueness:
         As for `refine_rotation`.
@@ -81,30 +94,34 @@ def refine_quaternion_wxyz(
     checked = check_matrix(matrix)
     start = check_start(quaternion_wxyz, "quaternion_wxyz", (4,), checked.value).value
     quaternion = _quaternion.stack(_quaternion.normalise(_quaternion.components(start)))
-    return _refine(checked.value, quaternion, step, iterations).astype(checked.dtype)
+    return _refine(checked.value, quaternion, step, iterations, escape).astype(checked.dtype)
 
 
-def _refine(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int) -> jax.Array:
+def _refine(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
     step = check_choice(step, "step", STEPS)
     matrix = jax.numpy.broadcast_to(matrix, (*quaternion.shape[:-1], 3, 3))
-    return _refined(matrix, quaternion, step, check_iterations(iterations), 0)
+    return _refined(matrix, quaternion, step, check_iterations(iterations), check_flag(escape, "escape"), 0)
 
 
-@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4))
-def _refined(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, order: int) -> jax.Array:
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
+def _refined(
+    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, order: int
+) -> jax.Array:
     """The iteration, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
     a, _ = scaled(_mat3.components(matrix))
     # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
     zero = a[0][0] * 0
     w, x, y, z = _quaternion.components(quaternion)
-    start = (w + zero, x + zero, y + zero, z + zero)
-    return _quaternion.stack(iterate(STEPS[step].correction, a, start, iterations))
+    q = (w + zero, x + zero, y + zero, z + zero)
+    if escape:
+        q = leave_equilibrium(a, q)
+    return _quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
 
 
 @_refined.defjvp
-def _refined_jvp(step: str, iterations: int, order: int, primals, tangents):
+def _refined_jvp(step: str, iterations: int, escape: bool, order: int, primals, tangents):
     (matrix, quaternion), (matrix_dot, _) = primals, tangents
-    refined = _refined(matrix, quaternion, step, iterations, order + 1)
+    refined = _refined(matrix, quaternion, step, iterations, escape, order + 1)
     q = _quaternion.components(refined)
     rotation = _mat3.stack(_quaternion.to_rotation(q))
     x, y, z = angular_tangent(matrix, rotation, matrix_dot, order=order)
