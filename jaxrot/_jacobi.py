@@ -83,6 +83,7 @@ def symmetric_eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     Ten Jacobi rotations, each in the plane of the largest entry off the diagonal. Instead of gathering that entry the
     frame is rolled until it stands at (0, 1). Absolute accuracy: a few eps of the largest eigenvalue.
 
+    Cost: 370 flops, 20 square roots and as many divisions.
     Source: Jacobi 1846; Müller et al. 2016, appendix C, where an entry below 1e-15 ends the loop. Here one below a
     quarter eps of the trace counts as zero: to turn by angles that are nothing but rounding costs twice the error at
     multiples of a rotation.
