@@ -29,7 +29,7 @@ def refine_rotation(
         step: A name in `STEPS`. Static.
         iterations: How many steps, ≥ 0. Static.
         escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
-            about nine torque steps, and nothing when it is off.
+            about three torque steps, and nothing when it is off.
 
     Returns:
         A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`. With
