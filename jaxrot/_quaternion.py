@@ -91,8 +91,8 @@ def to_rotation(q: Quaternion) -> Mat3:
     )
 
 
-def davenport_columns(m: Mat3) -> Columns:
-    """The columns of 1 + N(m), N the 4×4 matrix of Davenport's q-method; for a rotation R(q) each is 4 qᵢ q.
+def davenport_columns(m: Mat3, shift: jax.Array | float = 1.0) -> Columns:
+    """The columns of shift·1 + N(m), N the 4×4 matrix of Davenport's q-method; for R(q) and 1 they are 4 qᵢ q.
 
     Source: Sarabandi et al. 2020, eq. (27), four times.
     """
@@ -100,11 +100,34 @@ def davenport_columns(m: Mat3) -> Columns:
     xx, yy, zz = m[0][0], m[1][1], m[2][2]
     xy, xz, yz = m[1][0] + m[0][1], m[0][2] + m[2][0], m[2][1] + m[1][2]
     return (
-        (1 + (xx + yy + zz), d[0], d[1], d[2]),
-        (d[0], 1 + (xx - yy - zz), xy, xz),
-        (d[1], xy, 1 + (yy - xx - zz), yz),
-        (d[2], xz, yz, 1 + (zz - xx - yy)),
+        (shift + (xx + yy + zz), d[0], d[1], d[2]),
+        (d[0], shift + (xx - yy - zz), xy, xz),
+        (d[1], xy, shift + (yy - xx - zz), yz),
+        (d[2], xz, yz, shift + (zz - xx - yy)),
     )
+
+
+def adjugate(columns: Columns) -> Columns:
+    """The adjugate of a symmetric 4×4 matrix: where that is singular, each column is a multiple of its null vector.
+
+    By Laplace's expansion, in the 2×2 minors of the upper and of the lower two rows; 110 flops.
+    """
+    (a, b, c, d), (_, e, f, g), (_, _, h, i), (_, _, _, j) = columns
+    u01, u02, u03 = a * e - b * b, a * f - c * b, a * g - d * b
+    u12, u13, u23 = b * f - c * e, b * g - d * e, c * g - d * f
+    l02, l03 = c * i - h * d, c * j - i * d
+    l12, l13, l23 = f * i - h * g, f * j - i * g, h * j - i * i
+    ww = e * l23 - f * l13 + g * l12
+    wx = c * l13 - b * l23 - d * l12
+    wy = g * u23 - i * u13 + j * u12
+    wz = h * u13 - f * u23 - i * u12
+    xx = a * l23 - c * l03 + d * l02
+    xy = i * u03 - d * u23 - j * u02
+    xz = c * u23 - h * u03 + i * u02
+    yy = d * u13 - g * u03 + j * u01
+    yz = f * u03 - c * u13 - i * u01
+    zz = c * u12 - f * u02 + h * u01
+    return (ww, wx, wy, wz), (wx, xx, xy, xz), (wy, xy, yy, yz), (wz, xz, yz, zz)
 
 
 def largest_column(columns: Columns) -> Quaternion:
