@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3
+from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_sqrt, scaled
 
 
@@ -24,19 +25,10 @@ def solve(matrix: jax.Array) -> jax.Array:
     Source: Sarabandi et al. 2020, eq. (8)–(19), where (9) and (10) must read m − √p(cos θ ± √3 sin θ) (Smith 1961); as
     printed the eigenvalues do not add up to the trace. Franca 1989.
     """
-    # notation: m, q, p, theta, a0..a2 and b0..b2 are those of the paper.
+    # notation: a0..a2 and b0..b2 are those of the paper.
     a, _ = scaled(_mat3.components(matrix))
     c = _mat3.transpose_multiply(a, a)
-    m = _mat3.trace(c) / 3
-    deviator = _mat3.add(c, _mat3.scale(_mat3.identity_like(c), -m))
-    q = _mat3.determinant(deviator) / 2
-    p = _mat3.squared_norm(deviator) / 6
-    # Where two eigenvalues are equal, rounding makes the discriminant negative.
-    theta = jnp.arctan2(safe_sqrt(p * p * p - q * q), q) / 3
-    root_p = safe_sqrt(p)
-    cosine, sine = root_p * jnp.cos(theta), root_p * jnp.sin(theta) * 3**0.5
-    eigenvalues = (m + 2 * cosine, m - (cosine + sine), m - (cosine - sine))
-    s1, s2, s3 = (safe_sqrt(eigenvalue) for eigenvalue in eigenvalues)
+    s1, s2, s3 = (safe_sqrt(eigenvalue) for eigenvalue in smith_eigenvalues(c))
     a2, a1, a0 = s1 + s2 + s3, s1 * s2 + s1 * s3 + s2 * s3, s1 * s2 * s3
     denominator = a0 * (a2 * a1 - a0)
     b2 = a2 / denominator
@@ -45,3 +37,20 @@ def solve(matrix: jax.Array) -> jax.Array:
     polynomial = _mat3.add(_mat3.scale(_mat3.multiply(c, c), b2), _mat3.scale(c, -b1))
     polynomial = _mat3.add(polynomial, _mat3.scale(_mat3.identity_like(c), b0))
     return _mat3.stack(_mat3.multiply(a, polynomial))
+
+
+def smith_eigenvalues(c: Mat3) -> Vec3:
+    """The eigenvalues of a symmetric 3×3 matrix by the trigonometric formula, the largest first, the smallest last.
+
+    Absolute accuracy: eps times the largest, and √eps times their spread where two of them are equal.
+    """
+    # notation: m, q, p and theta are those of the paper.
+    m = _mat3.trace(c) / 3
+    deviator = _mat3.add(c, _mat3.scale(_mat3.identity_like(c), -m))
+    q = _mat3.determinant(deviator) / 2
+    p = _mat3.squared_norm(deviator) / 6
+    # Where two eigenvalues are equal, rounding makes the discriminant negative.
+    theta = jnp.arctan2(safe_sqrt(p * p * p - q * q), q) / 3
+    root_p = safe_sqrt(p)
+    cosine, sine = root_p * jnp.cos(theta), root_p * jnp.sin(theta) * 3**0.5
+    return m + 2 * cosine, m - (cosine - sine), m - (cosine + sine)
