@@ -1,10 +1,11 @@
-"""The average of the four quaternions that a noisy rotation matrix contains."""
+"""The average of the four quaternions that a noisy rotation matrix contains, with and without their signs."""
 
 import functools
 
 import jax
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._quaternion import Columns, Quaternion
 from jaxrot._scaling import unit_scaled
 
 
@@ -26,7 +27,30 @@ def solve(matrix: jax.Array) -> jax.Array:
     """
     columns = _quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))
     longest, _ = _quaternion.longest(columns)
-    first, *others = (_quaternion.with_sign_of(_quaternion.dot(longest, column), column) for column in columns)
-    total = functools.reduce(_quaternion.add, others, first)
+    w, x, y, z = (_quaternion.with_sign_of(_quaternion.dot(longest, column), column) for column in columns)
     # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.
-    return _mat3.stack(_quaternion.to_rotation(total))
+    return _mat3.stack(_quaternion.to_rotation(_sum((w, x, y, z))))
+
+
+def solve_simply(matrix: jax.Array) -> jax.Array:
+    """What the average is without the signs: it fails where the components of the quaternion add up to zero.
+
+    For a rotation with the quaternion q the sum of the columns is 4 (w + x + y + z) q: digits are lost as the bracket
+    gets small, NaN where it is 0, and noise decides near it.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64, any scale.
+
+    Returns:
+        (..., 3, 3) rotations, or NaN.
+
+    Cost: 115 flops and one square root, for the scale.
+    Source: Sarabandi et al. 2020, eq. (29), given there as what not to do. The scale is removed as in `solve`.
+    """
+    return _mat3.stack(
+        _quaternion.to_rotation(_sum(_quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))))
+    )
+
+
+def _sum(columns: Columns) -> Quaternion:
+    return functools.reduce(_quaternion.add, columns)

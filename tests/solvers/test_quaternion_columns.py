@@ -1,0 +1,53 @@
+"""Sarabandi et al. 2020, section IV: what to make of the four columns of eq. (27)."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxrot import METHODS
+from jaxrot.families import FAMILIES
+from jaxrot.report import reference
+
+
+def test_the_average_is_best_in_the_worst_case_and_shepperd_and_markley_worst_in_the_mean():
+    """Their figure 4. In the mean the average and Cayley cross over, at δ = 0.3 once the scale is removed."""
+    noisy = FAMILIES["noisy_rotation_0.5"].sample(10_000, dtype=np.float64).matrices
+    errors = {
+        name: np.linalg.norm(np.asarray(jax.jit(METHODS[name].solve)(noisy)) - noisy, axis=(1, 2))
+        for name in ("quaternion_average", "cayley", "shepperd_markley")
+    }
+    mean = [error.mean() for error in errors.values()]
+    assert mean == sorted(mean)
+    assert errors["quaternion_average"].max() < 0.8 * errors["cayley"].max()
+
+
+def test_the_simple_average_fails_where_the_components_add_up_to_zero():
+    # q ∝ (1, −1, 1, −1): the four columns cancel.
+    cancelling = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    assert np.linalg.det(cancelling) == 1
+    random = np.random.default_rng(0)
+    noisy = cancelling + random.uniform(-0.05, 0.05, (200, 3, 3))
+    errors = {
+        name: reference.forward_error(np.asarray(jax.jit(METHODS[name].solve)(noisy)), noisy)
+        for name in ("simple_average", "quaternion_average")
+    }
+    assert errors["quaternion_average"].max() < 0.2
+    assert np.median(errors["simple_average"]) > 0.2
+    assert np.isnan(METHODS["simple_average"].solve(jnp.asarray(cancelling))).all()
+    np.testing.assert_allclose(METHODS["quaternion_average"].solve(jnp.asarray(cancelling)), cancelling, atol=1e-15)
+
+
+def test_the_simple_average_is_no_worse_where_all_components_are_positive():
+    """The flaw is the signs alone."""
+    q = np.random.default_rng(0).uniform(0.5, 1, (4, 200))
+    w, x, y, z = q / np.linalg.norm(q, axis=0)
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)
+    noisy = rotation + np.random.default_rng(1).uniform(-0.01, 0.01, rotation.shape)
+    solved = [np.asarray(jax.jit(METHODS[name].solve)(noisy)) for name in ("simple_average", "quaternion_average")]
+    np.testing.assert_allclose(solved[0], solved[1], atol=1e-15)
