@@ -1,0 +1,97 @@
+"""Higham and Noferini's algorithm: the dominant eigenvalue, then inverse iteration with a pivoted LDLᵀ."""
+
+import jax
+import jax.numpy as jnp
+
+from jaxrot import _mat3, _quaternion
+from jaxrot._quaternion import Columns, Quaternion
+from jaxrot._scaling import safe_divide, unit_scaled
+from jaxrot.solvers.foam import largest_root
+
+# One iteration multiplies what is wrong with the eigenvector by the error of the eigenvalue over its gap.
+_INVERSE_ITERATIONS = 2
+
+# The exchanges of rows and columns that bring the largest pivot up: three candidates, then two, then one.
+_ORDER = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+
+
+def solve(matrix: jax.Array) -> jax.Array:
+    """The rotation of the eigenvector of Davenport's N(A) for its largest eigenvalue f.
+
+    f comes from Newton's method on the quartic; f·1 − N = P L D Lᵀ Pᵀ with diagonal pivoting; the start P L⁻ᵀ e₄ is
+    already the eigenvector where f is exact, and inverse iteration makes up for an f that is not.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64, any scale.
+
+    Returns:
+        (..., 3, 3) rotations, for det A ≤ 0 too.
+
+    Cost: about 450 flops with 14 Newton steps (float32), 620 with 28 (float64), and 30 or 44 divisions.
+    Source: Higham and Noferini, "An algorithm to compute the polar decomposition of a 3×3 matrix", 2016: [27] of
+    Sarabandi et al. 2020. The source takes the quartic's closed form where that is well-conditioned and iterates in a
+    two-dimensional subspace where it is not; without branches Newton and single vectors do for both. N itself is
+    theirs, so that its dominant eigenvalue is the algebraically largest.
+    """
+    a = unit_scaled(_mat3.components(matrix))
+    cofactor = _mat3.cofactor(a)
+    f = largest_root(cofactor, _mat3.squared_norm(a), _mat3.dot(a[0], cofactor[0]))
+    q = null_vector(_quaternion.davenport_columns(_mat3.scale(a, -1.0), f))
+    return _mat3.stack(_quaternion.to_rotation(q))
+
+
+def null_vector(columns: Columns) -> Quaternion:
+    """The eigenvector of a positive semidefinite 4×4 matrix for its eigenvalue next to 0, of any length but 0."""
+    m = [list(column) for column in columns]
+    trace = m[0][0] + m[1][1] + m[2][2] + m[3][3]
+    # A pivot below it is rounding; 1 where A = 0.
+    smallest = jnp.where(trace > 0, float(jnp.finfo(trace.dtype).eps) * trace, jnp.ones_like(trace))
+    exchanges: list[jax.Array] = []
+    for k in range(3):
+        for j in range(k + 1, 4):
+            is_larger = m[j][j] > m[k][k]
+            exchanges.append(is_larger)
+            m[k], m[j] = _exchanged(is_larger, m[k], m[j])
+            for row in m:
+                (row[k],), (row[j],) = _exchanged(is_larger, [row[k]], [row[j]])
+        for i in range(k + 1, 4):
+            # Where the pivot is 0 so is its column, to rounding.
+            factor = safe_divide(m[i][k], m[k][k])
+            for j in range(k + 1, 4):
+                m[i][j] = m[i][j] - factor * m[k][j]
+            m[i][k] = factor
+    pivots = [jnp.maximum(m[k][k], smallest) for k in range(4)]
+    zero, one = jnp.zeros_like(trace), jnp.ones_like(trace)
+    x = _backward(m, [zero, zero, zero, one])
+    for _ in range(_INVERSE_ITERATIONS):
+        x = _forward(m, x)
+        # Times the last pivot, the smallest one: the length does not matter, and may not overflow.
+        x = _backward(m, [value * (pivots[3] / pivot) for value, pivot in zip(x, pivots, strict=True)])
+    for (k, j), is_larger in reversed(list(zip(_ORDER, exchanges, strict=True))):
+        (x[k],), (x[j],) = _exchanged(is_larger, [x[k]], [x[j]])
+    return x[0], x[1], x[2], x[3]
+
+
+def _forward(m: list[list[jax.Array]], x: list[jax.Array]) -> list[jax.Array]:
+    """L⁻¹ x, L the part of m below the diagonal and ones on it."""
+    x = list(x)
+    for i in range(4):
+        for k in range(i):
+            x[i] = x[i] - m[i][k] * x[k]
+    return x
+
+
+def _backward(m: list[list[jax.Array]], x: list[jax.Array]) -> list[jax.Array]:
+    """L⁻ᵀ x."""
+    x = list(x)
+    for i in reversed(range(4)):
+        for k in range(i + 1, 4):
+            x[i] = x[i] - m[k][i] * x[k]
+    return x
+
+
+def _exchanged(condition: jax.Array, a: list[jax.Array], b: list[jax.Array]) -> tuple[list, list]:
+    return (
+        [jnp.where(condition, y, x) for x, y in zip(a, b, strict=True)],
+        [jnp.where(condition, x, y) for x, y in zip(a, b, strict=True)],
+    )
