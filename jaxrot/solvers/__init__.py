@@ -6,7 +6,26 @@ from typing import NamedTuple
 
 import jax
 
-from jaxrot.solvers import cayley, davenport, foam, quaternion_average, smith_franca, squaring, svd, torque
+from jaxrot.solvers import (
+    cayley,
+    davenport,
+    foam,
+    gram_schmidt,
+    higham_newton,
+    higham_noferini,
+    horn_quartic,
+    implicit_qr_svd,
+    inverse_square_root,
+    irving,
+    jacobi_svd,
+    quaternion_average,
+    shepperd_markley,
+    smith_franca,
+    squaring,
+    svd,
+    taylor,
+    torque,
+)
 
 
 class Method(NamedTuple):
@@ -50,6 +69,33 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "cayley": Method(cayley.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (31)"),
         "foam": Method(foam.solve, True, True, True, _limit(1, 1), "Markley 1993"),
         "squaring": Method(squaring.solve, True, True, True, _limit(2.0**20, 2.0**49), "Wu et al. 2018 (FA3R)"),
+        "irving": Method(
+            irving.solve, True, True, True, _limit(0, 0), "Irving et al. 2004; Müller et al. 2016, appendix C"
+        ),
+        "gram_schmidt": Method(gram_schmidt.solve, False, False, True, _limit(0, 0), "Müller et al. 2016, section 2"),
+        "inverse_square_root": Method(
+            inverse_square_root.solve,
+            True,
+            False,
+            True,
+            _limit(0, 0),
+            "Wessner 1966; Sarabandi et al. 2020, eq. (2)",
+        ),
+        "higham_newton": Method(higham_newton.solve, True, False, True, _limit(0.5, 0.5), "Higham 1986"),
+        "taylor": Method(taylor.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (20)"),
+        "taylor_iterated": Method(taylor.solve_iterated, True, False, True, _limit(0.5, 0.5), "Hasan 2009"),
+        "shepperd_markley": Method(
+            shepperd_markley.solve, False, False, True, _limit(0, 0), "Shepperd 1978; Markley 2008"
+        ),
+        "simple_average": Method(
+            quaternion_average.solve_simply, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (29)"
+        ),
+        "horn_quartic": Method(horn_quartic.solve, True, True, True, _limit(2, 2), "Horn 1987"),
+        "higham_noferini": Method(higham_noferini.solve, True, True, True, _limit(2, 2), "Higham and Noferini 2016"),
+        "jacobi_svd": Method(jacobi_svd.solve, True, True, True, _limit(2.0**20, 2.0**49), "Kogbetliantz 1955"),
+        "implicit_qr_svd": Method(
+            implicit_qr_svd.solve, True, True, True, _limit(2.0**20, 2.0**49), "Gast et al. 2016"
+        ),
         "torque": Method(torque.solve, False, True, True, _limit(0, 0), "Müller et al. 2016, section 3"),
     }
 )
