@@ -32,7 +32,7 @@ def test_a_rotation_that_is_not_nearest_is_caught_where_it_is_not_unique():
 
 
 def test_a_reflection_is_caught():
-    with pytest.raises(AssertionError, match="determinant"):
+    with pytest.raises(AssertionError, match="orthogonality"):
         assert_rotations(-NEAREST, BATCH.families)
 
 

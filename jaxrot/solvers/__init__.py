@@ -61,7 +61,7 @@ DEFAULT_METHOD = "squaring"
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "svd": Method(svd.solve, True, True, True, _limit(0, 0), "LAPACK; Kabsch 1976"),
-        "davenport": Method(davenport.solve, True, True, True, _limit(2, 0), "Davenport's q-method; Horn 1987"),
+        "davenport": Method(davenport.solve, True, True, True, _limit(0, 0), "Davenport's q-method; Horn 1987"),
         "smith_franca": Method(smith_franca.solve, True, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (16)"),
         "quaternion_average": Method(
             quaternion_average.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (30)"
