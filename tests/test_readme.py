@@ -22,7 +22,7 @@ def test_the_code_in_the_readme_does_what_it_says():
 
 
 def test_the_readme_has_one_command_for_the_report_and_one_for_the_tests():
-    commands = [line for line in README.splitlines() if "pip install" in line]
+    commands = [line for line in README.splitlines() if line.startswith("python3 -m venv")]
     assert len(commands) == 2
     assert sum("python -m jaxrot report" in line for line in commands) == 1
     assert sum("python -m pytest" in line for line in commands) == 1

@@ -67,7 +67,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             quaternion_average.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (30)"
         ),
         "cayley": Method(cayley.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (31)"),
-        "foam": Method(foam.solve, True, True, True, _limit(1, 1), "Markley 1993"),
+        "foam": Method(foam.solve, True, True, True, _limit(0.5, 0.5), "Markley 1993"),
         "squaring": Method(squaring.solve, True, True, True, _limit(2.0**20, 2.0**49), "Wu et al. 2018 (FA3R)"),
         "irving": Method(
             irving.solve, True, True, True, _limit(0, 0), "Irving et al. 2004; Müller et al. 2016, appendix C"
