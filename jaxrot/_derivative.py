@@ -16,7 +16,7 @@ from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import power_of_two_factor
+from jaxrot._scaling import is_positive, power_of_two_factor
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
@@ -78,11 +78,11 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> tuple[Vec3, jax.Array]:
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     # The largest diagonal entry comes first. What is exchanged here is exchanged back, in reverse, at the end.
-    first = h11 > h00
+    first = is_positive(h11 - h00)
     h00, h11 = _exchange(first, h00, h11)
     h02, h12 = _exchange(first, h02, h12)
     v0, v1 = _exchange(first, v0, v1)
-    second = h22 > h00
+    second = is_positive(h22 - h00)
     h00, h22 = _exchange(second, h00, h22)
     h01, h12 = _exchange(second, h01, h12)
     v0, v2 = _exchange(second, v0, v2)
@@ -94,16 +94,17 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> tuple[Vec3, jax.Array]:
     s22 = (h22 - l2[0] * h02, delta - l2[1] * h02)
     y1 = (v1 - l1[0] * v0, -l1[1] * v0)
     y2 = (v2 - l2[0] * v0, -l2[1] * v0)
-    third = s22[0] > s11[0]
+    third = is_positive(s22[0] - s11[0])
     s11, s22 = _exchange_complex(third, s11, s22)
     y1, y2 = _exchange_complex(third, y1, y2)
     l1, l2 = _exchange_complex(third, l1, l2)
 
-    inverse1 = _reciprocal(s11)
-    l12 = _multiply(inverse1, s12)
+    l12 = _divide(s12, s11)
     pivot = _subtract(s22, _multiply(l12, s12))
-    x2 = _multiply(_reciprocal(pivot), _subtract(y2, _multiply(l12, y1)))
-    x1 = _subtract(_multiply(inverse1, y1), _multiply(l12, x2))
+    # Quotients, not products with reciprocals: along an unresolved axis these are rounding, and XLA computes a quotient
+    # once for all components of the result, a product again and differently for each.
+    x2 = _divide(_subtract(y2, _multiply(l12, y1)), pivot)
+    x1 = _divide(_subtract(y1, _multiply(s12, x2)), s11)
     x0 = inverse0[0] * v0 - _multiply(l1, x1)[0] - _multiply(l2, x2)[0]
 
     x1, x2 = _exchange(third, x1[0], x2[0])
@@ -180,6 +181,11 @@ def _multiply(a: _Complex, b: _Complex) -> _Complex:
 
 def _subtract(a: _Complex, b: _Complex) -> _Complex:
     return a[0] - b[0], a[1] - b[1]
+
+
+def _divide(a: _Complex, b: _Complex) -> _Complex:
+    square = b[0] * b[0] + b[1] * b[1]
+    return (a[0] * b[0] + a[1] * b[1]) / square, (a[1] * b[0] - a[0] * b[1]) / square
 
 
 def _reciprocal(a: _Complex) -> _Complex:

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_divide, safe_sqrt
+from jaxrot._scaling import is_positive, safe_divide, safe_sqrt
 
 # notation: a quaternion on components is a tuple (w, x, y, z) of arrays of one batch shape.
 Quaternion = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
@@ -52,7 +52,7 @@ def add(p: Quaternion, q: Quaternion) -> Quaternion:
 
 def with_sign_of(sign: jax.Array, q: Quaternion) -> Quaternion:
     """The quaternion where `sign` ≥ 0, its negative elsewhere: sign(0) counts as +1."""
-    flip = sign < 0
+    flip = is_positive(-sign)
     w, x, y, z = q
     return (jnp.where(flip, -w, w), jnp.where(flip, -x, x), jnp.where(flip, -y, y), jnp.where(flip, -z, z))
 
@@ -149,7 +149,7 @@ def longest(columns: Columns) -> tuple[Quaternion, Quaternion]:
 def _column_with_largest(columns: Columns, sizes: Quaternion) -> Quaternion:
     (w, x, y, z), largest = columns[0], sizes[0]
     for column, size in zip(columns[1:], sizes[1:], strict=True):
-        better = size > largest
+        better = is_positive(size - largest)
         w, x, y, z = (jnp.where(better, new, old) for new, old in zip(column, (w, x, y, z), strict=True))
         largest = jnp.where(better, size, largest)
     return (w, x, y, z)

@@ -53,6 +53,16 @@ def unit_scaled(m: Mat3) -> Mat3:
     return _mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm))
 
 
+def is_positive(x: jax.Array) -> jax.Array:
+    """Whether x > 0, decided once for everything that hangs on it.
+
+    XLA computes what is cheap again in every fusion, with products and sums contracted differently. Where x is 0 but
+    for rounding, one component of a result could then follow one branch and its neighbour the other: no rotation, or a
+    wrong one. A quotient is computed once.
+    """
+    return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
+
+
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
     """The quotient, and 0 where the denominator is 0; the derivative is finite there too."""
     is_zero = denominator == 0
