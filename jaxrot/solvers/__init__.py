@@ -55,7 +55,7 @@ def _limit(float32: float, float64: float) -> Mapping[str, float]:
     return MappingProxyType({"float32": float32, "float64": float64})
 
 
-# The whole contract holds for `squaring` alone, so it is the default.
+# The fastest of the methods that keep the whole contract, singular, inverted and extreme matrices included.
 DEFAULT_METHOD = "squaring"
 
 METHODS: Mapping[str, Method] = MappingProxyType(
