@@ -34,7 +34,7 @@ class _Size(NamedTuple):
     timing_budget_s: float
 
 
-_FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 100.0)
+_FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 70.0)
 _QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0)
 
 
