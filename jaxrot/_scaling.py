@@ -1,19 +1,11 @@
-"""Exact scaling by powers of two, and division that knows what 0/0 means."""
+"""Exact scaling by powers of two; divisions, roots and signs that are safe where their argument is 0 or rounding."""
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3
-
-
-def scale_exponent_bits(dtype: np.dtype) -> tuple[np.dtype, int, int]:
-    """The integer dtype of the same width, the number of mantissa bits and the mask of the exponent bits."""
-    info = jnp.finfo(dtype)
-    integer = jnp.dtype(f"int{info.bits}")
-    return integer, int(info.nmant), (1 << int(info.nexp)) - 1
 
 
 def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
@@ -31,8 +23,9 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
         for inf and NaN the smallest normal one. It is a constant to differentiation.
     """
     magnitude = lax.stop_gradient(magnitude)
-    integer, mantissa_bits, mask = scale_exponent_bits(magnitude.dtype)
-    exponent = (lax.bitcast_convert_type(magnitude, integer) >> mantissa_bits) & mask
+    info = jnp.finfo(magnitude.dtype)
+    mantissa_bits, mask = int(info.nmant), (1 << int(info.nexp)) - 1
+    exponent = (lax.bitcast_convert_type(magnitude, jnp.dtype(f"int{info.bits}")) >> mantissa_bits) & mask
     inverse = jnp.clip(mask - exponent, 1, mask - 1)
     return lax.bitcast_convert_type(inverse << mantissa_bits, magnitude.dtype)
 

@@ -37,7 +37,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     is_finite = jnp.isfinite(_mat3.largest_entry(m))
     a, _ = scaled(_mat3.where(is_finite, m, _mat3.identity_like(m)))
     norm = safe_sqrt(_mat3.squared_norm(a))
-    # 0.99: for a rotation or its negative 1 + N has an eigenvalue 4 or several 2; below them nothing may overtake.
+    # At −R and with the factor 1 the eigenvalues of 1 + N are 2, 2, 2 and −2: squaring would not part them.
     h = _mat3.scale(a, safe_divide(jnp.full_like(norm, 0.99 * 3**0.5), norm))
     h = lax.fori_loop(0, _SQUARINGS[matrix.dtype.name], lambda _, h: square(h), h)
     q = _quaternion.normalise(_quaternion.largest_column(_quaternion.davenport_columns(h)))
