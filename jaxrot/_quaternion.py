@@ -91,6 +91,17 @@ def to_rotation(q: Quaternion) -> Mat3:
     )
 
 
+def to_scaled_rotation(q: Quaternion) -> Mat3:
+    """The rotation of a quaternion times its squared length: for what divides last, or not at all."""
+    w, x, y, z = q
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return (
+        (ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz),
+    )
+
+
 def davenport_columns(m: Mat3, shift: jax.Array | float = 1.0) -> Columns:
     """The columns of shift·1 + N(m), N the 4×4 matrix of Davenport's q-method; for R(q) and 1 they are 4 qᵢ q.
 

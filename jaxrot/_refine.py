@@ -108,7 +108,7 @@ def _refined(
     matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, order: int
 ) -> jax.Array:
     """The iteration, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
     zero = a[0][0] * 0
     w, x, y, z = _quaternion.components(quaternion)

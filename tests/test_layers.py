@@ -10,7 +10,7 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
     {"_inputs", "_mat3", "_quaternion", "_scaling", "families"},
-    {"_derivative", "_jacobi"},
+    {"_derivative", "_definite", "_jacobi"},
     {"steps"},
     {"solvers"},
     {"_nearest", "_refine"},

@@ -11,6 +11,7 @@ from jaxrot.solvers import (
     davenport,
     foam,
     gram_schmidt,
+    half_turn,
     higham_newton,
     higham_noferini,
     horn_quartic,
@@ -56,10 +57,13 @@ def _limit(float32: float, float64: float) -> Mapping[str, float]:
 
 
 # The fastest of the methods that keep the whole contract, singular, inverted and extreme matrices included.
-DEFAULT_METHOD = "squaring"
+DEFAULT_METHOD = "half_turn"
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
+        "half_turn": Method(
+            half_turn.solve, True, True, True, _limit(2.0**20, 2.0**49), "Markley 1993; Higham and Noferini 2016"
+        ),
         "svd": Method(svd.solve, True, True, True, _limit(0, 0), "LAPACK; Kabsch 1976"),
         "davenport": Method(davenport.solve, True, True, True, _limit(0, 0), "Davenport's q-method; Horn 1987"),
         "smith_franca": Method(smith_franca.solve, True, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (16)"),

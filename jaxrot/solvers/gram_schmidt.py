@@ -35,7 +35,7 @@ def orthogonalised(matrix: jax.Array, *, order: tuple[int, int, int]) -> jax.Arr
     Returns:
         (..., 3, 3) rotations.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     columns = _mat3.transpose(a)
     first = _unit(columns[order[0]])
     second = columns[order[1]]

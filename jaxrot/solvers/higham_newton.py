@@ -28,7 +28,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Cost: 95 flops, two square roots and three divisions a step.
     Source: Higham 1986; Müller et al. 2016, section 2, which prints it without the scaling.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     return _mat3.stack(lax.fori_loop(0, _ITERATIONS[matrix.dtype.name], lambda _, r: newton(r), a))
 
 

@@ -36,7 +36,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Cost: see `decompose`.
     Source: Sarabandi et al. 2020, section V, reference [33]; the determinant is repaired as in `jacobi_svd`.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     left, _, right = decompose(a)
     # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
     return _mat3.stack(_mat3.newton_schulz(_mat3.multiply(left, _mat3.transpose(right))))

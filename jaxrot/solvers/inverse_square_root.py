@@ -23,7 +23,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Source: Wessner 1966, in Müller et al. 2016, section 2; Sarabandi et al. 2020, eq. (2), (6) and (7), where V holds
     the columns of what is printed as Vᵀ.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     eigenvalues, axes = _jacobi.symmetric_eigen(_mat3.transpose_multiply(a, a))
     weighted = [_mat3.scale_vector(axis, 1 / jnp.sqrt(x)) for axis, x in zip(axes, eigenvalues, strict=True)]
     root = _mat3.transpose_multiply((weighted[0], weighted[1], weighted[2]), axes)

@@ -30,7 +30,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     here the scale is removed, the first is not needed, and the second is relative to the largest singular value. The
     determinant of V, which the source tests, is +1 as a product of rotations.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     eigenvalues, axes = _jacobi.symmetric_eigen(_mat3.transpose_multiply(a, a))
     s = (safe_sqrt(eigenvalues[0]), safe_sqrt(eigenvalues[1]), safe_sqrt(eigenvalues[2]))
     limit = _RANK_TOLERANCE[matrix.dtype.name] * jnp.maximum(jnp.maximum(s[0], s[1]), s[2])

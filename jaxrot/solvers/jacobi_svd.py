@@ -24,7 +24,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Source: Sarabandi et al. 2020, section V, reference [32] (the Jacobi SVD of Eigen); the repair of the determinant is
     not their (5), diag(1, 1, −1), which is right for sorted singular values and det A < 0 alone.
     """
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     left, _, right = decompose(a)
     # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
     return _mat3.stack(_mat3.newton_schulz(_mat3.multiply(left, _mat3.transpose(right))))

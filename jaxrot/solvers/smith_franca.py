@@ -26,7 +26,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     printed the eigenvalues do not add up to the trace. Franca 1989.
     """
     # notation: a0..a2 and b0..b2 are those of the paper.
-    a, _ = scaled(_mat3.components(matrix))
+    a = scaled(_mat3.components(matrix))
     c = _mat3.transpose_multiply(a, a)
     s1, s2, s3 = (safe_sqrt(eigenvalue) for eigenvalue in smith_eigenvalues(c))
     a2, a1, a0 = s1 + s2 + s3, s1 * s2 + s1 * s3 + s2 * s3, s1 * s2 * s3

@@ -33,9 +33,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Cost: about 65 flops a squaring, 1,900 in float32 and 3,900 in float64 with the steps.
     Source: Wu et al., "Fast analytical 3D rigid registration" (FA3R), 2018.
     """
-    m = _mat3.components(matrix)
-    is_finite = jnp.isfinite(_mat3.largest_entry(m))
-    a, _ = scaled(_mat3.where(is_finite, m, _mat3.identity_like(m)))
+    a = scaled(_mat3.components(matrix))
     norm = safe_sqrt(_mat3.squared_norm(a))
     # At −R and with the factor 1 the eigenvalues of 1 + N are 2, 2, 2 and −2: squaring would not part them.
     h = _mat3.scale(a, safe_divide(jnp.full_like(norm, 0.99 * 3**0.5), norm))
@@ -43,8 +41,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     q = _quaternion.normalise(_quaternion.largest_column(_quaternion.davenport_columns(h)))
     for _ in range(_POLISHING_STEPS):
         q = polish(a, q)
-    r = _mat3.newton_schulz(_quaternion.to_rotation(q))
-    return _mat3.stack(_mat3.where(is_finite, r, _mat3.scale(r, jnp.nan)))
+    return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
 
 
 def square(h: Mat3) -> Mat3:
