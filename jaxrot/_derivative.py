@@ -16,7 +16,7 @@ from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import is_positive, power_of_two_factor
+from jaxrot._scaling import power_of_two_factor
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
@@ -52,65 +52,47 @@ def angular_tangent(
     r = _mat3.components(rotation)
     stretch = _mat3.transpose_multiply(r, _mat3.components(_normalised(matrix, rotation, order + 1)))
     factor = _factor(matrix)
-    # The factor is applied in two halves, before and after: at once it could overflow or underflow on one side.
+    # The factor is applied in two halves, before and after: at once it could overflow or underflow on one side. Both are
+    # divisions, because XLA:CPU stores quotients and forms products again in each entry of the result, and the
+    # transpose, the reverse mode, has them in the other order: with products the reverse mode took 1.7 times as long.
     first_half = power_of_two_factor(lax.rsqrt(jnp.where(factor > 0, factor, jnp.ones_like(factor))))
-    a_dot = _mat3.scale(_mat3.components(matrix_dot), first_half)
-    torque = _mat3.axial(_mat3.transpose_multiply(r, a_dot))
-    omega, last_pivot = damped_solve(_mat3.gap_matrix(stretch), resolved_gap(stretch, damping), torque)
-    return _mat3.scale_vector(omega, _gain(factor, last_pivot, order) / first_half)
+    inverse, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(stretch, damping))
+    torque = _divided(_mat3.axial(_mat3.transpose_multiply(r, _mat3.components(matrix_dot))), 1 / first_half)
+    return _divided(_mat3.apply(inverse, torque), first_half / _gain(factor, norm, order))
 
 
-def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> tuple[Vec3, jax.Array]:
-    """H(H²+δ²)⁻¹ v = Re[(H+iδ)⁻¹ v], and the size of the last pivot.
+def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
+    """H(H²+δ²)⁻¹ = Re (H+iδ)⁻¹, and about the largest singular value of (H+iδ)⁻¹.
 
-    The factorisation is LDLᵀ of the complex symmetric H+iδ with diagonal pivoting. The closed form through the adjugate
-    is shorter and loses eps κ² where two gaps are small (near −R): the Jacobian was off by 7e3 eps κ there, with this
-    one by 5.9 eps κ.
+    By LDLᵀ of the complex symmetric H+iδ. Its real and imaginary parts are both semidefinite, so that nothing need be
+    exchanged (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts", 1998).
+    The closed form through the adjugate is shorter and loses eps κ² where two gaps are small (near −R): the Jacobian was
+    off by 7e3 eps κ there, with LDLᵀ by a few eps κ.
 
     Args:
         h: Symmetric, positive semidefinite to rounding.
         delta: Positive.
-        v: The right-hand side.
 
     Returns:
-        The solution and the modulus of the last pivot, within a small factor of the smallest singular value of H+iδ.
+        The symmetric matrix, and the largest modulus on the diagonal of (H+iδ)⁻¹: at least a third of its norm.
     """
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
-    v0, v1, v2 = v
-    # The largest diagonal entry comes first. What is exchanged here is exchanged back, in reverse, at the end.
-    first = is_positive(h11 - h00)
-    h00, h11 = _exchange(first, h00, h11)
-    h02, h12 = _exchange(first, h02, h12)
-    v0, v1 = _exchange(first, v0, v1)
-    second = is_positive(h22 - h00)
-    h00, h22 = _exchange(second, h00, h22)
-    h01, h12 = _exchange(second, h01, h12)
-    v0, v2 = _exchange(second, v0, v2)
-
-    inverse0 = _reciprocal((h00, delta))
-    l1, l2 = _times(inverse0, h01), _times(inverse0, h02)
-    s11 = (h11 - l1[0] * h01, delta - l1[1] * h01)
+    r0 = _reciprocal((h00, delta))
+    l1, l2 = _times(r0, h01), _times(r0, h02)
     s12 = (h12 - l1[0] * h02, -l1[1] * h02)
-    s22 = (h22 - l2[0] * h02, delta - l2[1] * h02)
-    y1 = (v1 - l1[0] * v0, -l1[1] * v0)
-    y2 = (v2 - l2[0] * v0, -l2[1] * v0)
-    third = is_positive(s22[0] - s11[0])
-    s11, s22 = _exchange_complex(third, s11, s22)
-    y1, y2 = _exchange_complex(third, y1, y2)
-    l1, l2 = _exchange_complex(third, l1, l2)
+    r1 = _reciprocal((h11 - l1[0] * h01, delta - l1[1] * h01))
+    l12 = _multiply(s12, r1)
+    r2 = _reciprocal(_subtract((h22 - l2[0] * h02, delta - l2[1] * h02), _multiply(l12, s12)))
 
-    l12 = _divide(s12, s11)
-    pivot = _subtract(s22, _multiply(l12, s12))
-    # Quotients, not products with reciprocals: along an unresolved axis these are rounding, and XLA computes a quotient
-    # once for all components of the result, a product again and differently for each.
-    x2 = _divide(_subtract(y2, _multiply(l12, y1)), pivot)
-    x1 = _divide(_subtract(y1, _multiply(s12, x2)), s11)
-    x0 = inverse0[0] * v0 - _multiply(l1, x1)[0] - _multiply(l2, x2)[0]
-
-    x1, x2 = _exchange(third, x1[0], x2[0])
-    x0, x2 = _exchange(second, x0, x2)
-    x0, x1 = _exchange(first, x0, x1)
-    return (x0, x1, x2), jnp.sqrt(pivot[0] * pivot[0] + pivot[1] * pivot[1])
+    # notation: the columns of L⁻ᵀ are (1, 0, 0), (−l1, 1, 0), (c, −l12, 1).
+    c = _subtract(_multiply(l1, l12), l2)
+    last = _multiply(l12, r2)
+    m00 = _add(r0, _add(_multiply(l1, _multiply(l1, r1)), _multiply(c, _multiply(c, r2))))
+    m01 = _add(_multiply(l1, r1), _multiply(c, last))
+    m02, m11 = _multiply(c, r2), _add(r1, _multiply(l12, last))
+    largest = jnp.maximum(jnp.maximum(_square(m00), _square(m11)), _square(r2))
+    inverse = ((m00[0], -m01[0], m02[0]), (-m01[0], m11[0], -last[0]), (m02[0], -last[0], r2[0]))
+    return inverse, jnp.sqrt(largest)
 
 
 def resolved_gap(stretch: Mat3, damping: float = 0.0) -> jax.Array:
@@ -142,52 +124,50 @@ def _normalised_jvp(order: int, primals, tangents):
     stretch = _mat3.transpose_multiply(
         _mat3.components(lax.stop_gradient(rotation)), _mat3.components(lax.stop_gradient(value))
     )
-    zero = jnp.zeros_like(stretch[0][0])
-    _, last_pivot = damped_solve(_mat3.gap_matrix(stretch), resolved_gap(stretch), (zero, zero, zero))
-    return value, matrix_dot * _gain(_factor(matrix), last_pivot, order)[..., None, None]
+    _, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(stretch))
+    return value, matrix_dot * _gain(_factor(matrix), norm, order)[..., None, None]
 
 
-def _gain(factor: jax.Array, last_pivot: jax.Array, order: int) -> jax.Array:
+def _gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """The factor, saturated so that the derivatives up to this order stay finite where they would overflow.
 
-    The n-th derivative grows like gⁿ, g = factor / gap: at |A| = 1e-20 the second one is 1e40. Beyond what the dtype
-    holds the product of the factors is held constant, with a margin of 2¹⁰ an order for the number of terms.
+    The n-th derivative grows like gⁿ, g = factor·‖(H+iδ)⁻¹‖: at |A| = 1e-20 the second one is 1e40. Beyond what the
+    dtype holds the product of the factors is held constant, with a margin of 2¹⁰ an order for the number of terms.
     """
-    last_pivot = lax.stop_gradient(last_pivot)
+    norm = lax.stop_gradient(norm)
     largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 3)
     limit = largest * 2.0 ** (-10 * order)
-    growth = factor / last_pivot
+    growth = factor * norm
     lower_orders = 1.0 if order == 0 else jnp.minimum(growth**order, largest * 2.0 ** (-10 * (order - 1)))
-    return jnp.where(growth <= limit ** (1 / (order + 1)), factor, last_pivot * (limit / lower_orders))
+    return jnp.where(growth <= limit ** (1 / (order + 1)), factor, limit / lower_orders / norm)
 
 
-def _exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
-    return jnp.where(condition, b, a), jnp.where(condition, a, b)
-
-
-def _exchange_complex(condition: jax.Array, a: _Complex, b: _Complex) -> tuple[_Complex, _Complex]:
-    real_a, real_b = _exchange(condition, a[0], b[0])
-    imaginary_a, imaginary_b = _exchange(condition, a[1], b[1])
-    return (real_a, imaginary_a), (real_b, imaginary_b)
+def _divided(v: Vec3, divisor: jax.Array) -> Vec3:
+    # The maximum keeps XLA from turning x/(y/z) into (x z)/y, which overflows.
+    divisor = jnp.maximum(divisor, float(jnp.finfo(divisor.dtype).tiny))
+    return (v[0] / divisor, v[1] / divisor, v[2] / divisor)
 
 
 def _times(a: _Complex, real: jax.Array) -> _Complex:
     return a[0] * real, a[1] * real
 
 
-def _multiply(a: _Complex, b: _Complex) -> _Complex:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+def _add(a: _Complex, b: _Complex) -> _Complex:
+    return a[0] + b[0], a[1] + b[1]
 
 
 def _subtract(a: _Complex, b: _Complex) -> _Complex:
     return a[0] - b[0], a[1] - b[1]
 
 
-def _divide(a: _Complex, b: _Complex) -> _Complex:
-    square = b[0] * b[0] + b[1] * b[1]
-    return (a[0] * b[0] + a[1] * b[1]) / square, (a[1] * b[0] - a[0] * b[1]) / square
+def _multiply(a: _Complex, b: _Complex) -> _Complex:
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
+def _square(a: _Complex) -> jax.Array:
+    return a[0] * a[0] + a[1] * a[1]
 
 
 def _reciprocal(a: _Complex) -> _Complex:
-    inverse = 1 / (a[0] * a[0] + a[1] * a[1])
-    return a[0] * inverse, -a[1] * inverse
+    square = _square(a)
+    return a[0] / square, -a[1] / square
