@@ -44,7 +44,7 @@ def refine_rotation(
         population, Gaussian, κ log-uniform, s2 and s3 log-uniform; the worst of them, float32 and float64. `newton`:
         from 45° off after 5 steps none for κ < 10, 0.05 % for κ < 1e3; from uniformly random starts after 8 steps one
         matrix for κ < 1e3, after 16 with `escape` none. `cayley`: from 45° off after 5 steps none for κ < 10, 2.4 % for
-        κ < 1e3. `quest`: none for κ < 10, 0.3 % for κ < 1e3, all of them in float32. The linear steps need tens.
+        κ < 1e3. `quest`: none for κ < 10, 0.3 % in float32 and none in float64 for κ < 1e3. The linear steps need tens.
 
     Raises:
         ValueError: Wrong shape, unknown step, negative iterations.
@@ -52,7 +52,8 @@ def refine_rotation(
 
     Uniqueness:
         From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) every step stands
-        still, unless `escape` is on. At A = 0 the start is kept, at rank 1 its angle about the free axis.
+        still, unless `escape` is on. At A = 0 the start is kept, at rank 1 its angle about the free axis (with
+        `quest` to √eps).
 
     Derivative:
         The implicit rule of `nearest_rotation`, at the rotation that was reached: right at convergence, and zero with

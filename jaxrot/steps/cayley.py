@@ -7,7 +7,7 @@ from jaxrot import _mat3
 from jaxrot._derivative import damped_solve
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_sqrt
+from jaxrot._scaling import computed_once, safe_sqrt
 
 
 def correction(b: Mat3) -> Quaternion:
@@ -24,6 +24,7 @@ def correction(b: Mat3) -> Quaternion:
 
     Source: Zhang 2021, and the shift Zhang adds to Newton's matrix 2(t·1 − sym B). About 190 flops.
     """
+    b = computed_once(b)
     return cayley_map(b, zhang_shift(b))
 
 

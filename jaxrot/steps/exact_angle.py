@@ -8,7 +8,7 @@ from jaxrot._quaternion import Quaternion
 from jaxrot._scaling import safe_divide, safe_sqrt
 
 # Below 4 eps ‖B‖ the trace depends on the angle by rounding alone. And a torque below 1 eps ‖B‖ is rounding: followed,
-# it turned 4 of 500 matrices of rank 1 about the axis that they leave free, by up to 3e-3 in float32.
+# it turned some of 20,000 matrices of rank 1 by 600 eps about the axis that they leave free, instead of 13 at most.
 _FLAT = 4
 
 

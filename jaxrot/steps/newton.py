@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import is_positive, safe_sqrt
+from jaxrot._scaling import computed_once, is_positive, safe_sqrt
 from jaxrot.steps.cayley import zhang_shift
 from jaxrot.steps.exact_angle import turn_about
 
@@ -30,6 +30,7 @@ def correction(b: Mat3) -> Quaternion:
     Source: Kugelstadt et al. 2018 (analytic polar decomposition) for Newton's axis; Zhang 2021 for the shift. About 240
     flops.
     """
+    b = computed_once(b)
     h = _mat3.add_to_diagonal(_mat3.gap_matrix(b), zhang_shift(b) * 0.5)
     return turn_about(b, _ascent(h, *_resolved(b), _mat3.axial(b)))
 

@@ -4,24 +4,32 @@ import functools
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from certificate import assert_rotations
 
-from jaxrot import STEPS, refine_rotation
+from jaxrot import STEPS, _mat3, _quaternion, refine_rotation
 from jaxrot.families import FAMILIES, half_turn_starts
 from jaxrot.report import reference
+from jaxrot.steps.exact_angle import turn_about
 
 EXACT_ANGLE = ["torque_exact_angle", "newton"]
 DTYPES = ["float32", "float64"]
+# Every batch is as long, so that a step compiles once a dtype.
+COUNT = 40 * len(FAMILIES)
+
+
+leave = jax.jit(functools.partial(refine_rotation, iterations=0, escape=True))
 
 
 @functools.lru_cache
-def advance(step, iterations=1, escape=False):
-    return jax.jit(functools.partial(refine_rotation, step=step, iterations=iterations, escape=escape))
+def advance(step):
+    return jax.jit(functools.partial(refine_rotation, step=step, iterations=1))
 
 
 def repeat(step, matrices, rotation, times):
+    """One step a call, so that any number of them is one program."""
     for _ in range(times):
         rotation = np.asarray(advance(step)(matrices, rotation))
     return rotation
@@ -56,7 +64,7 @@ class Problem(NamedTuple):
 
 
 @functools.lru_cache
-def problem(dtype, limit, count=4000):
+def problem(dtype, limit, count=COUNT):
     """κ log-uniform to the limit, s2 uniform over what that allows: three in four inverted."""
     random = np.random.default_rng(int(limit))
     gap = np.exp(random.uniform(np.log(1 / limit), np.log(2), count))
@@ -74,7 +82,7 @@ def problem(dtype, limit, count=4000):
 MEDIANS = {
     "torque": [21, 51, 95, 23, 59, 110],
     "torque_exact_angle": [11, 31, 23, 12, 38, 32],
-    "newton": [2, 2, 2, 3, 3, 3],
+    "newton": [2, 2, 2, 3, 4, 3],
     "cayley": [3, 3, 3],
     "quest": [1, 1, 1, 1, 1, 1],
 }
@@ -83,7 +91,7 @@ MEDIANS = {
 @pytest.mark.parametrize("step", STEPS)
 def test_the_median_number_of_steps_is_as_documented(step):
     """To 1e-6, from 45° and then from 150° off, at three spectra, one of them inverted."""
-    random, count = np.random.default_rng(1), 100
+    random, count = np.random.default_rng(1), COUNT
     medians = []
     for angle in (np.pi / 4, 150 * np.pi / 180)[: len(MEDIANS[step]) // 3]:
         for values in ((1, 0.6, 0.3), (1, 0.7, -0.4), (1, 0.1, 0.05)):
@@ -104,12 +112,12 @@ def test_the_median_number_of_steps_is_as_documented(step):
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("limit", [10, 1000])
 def test_newton_reaches_the_contract_from_anywhere(limit, dtype):
-    """Of 4,000, half of them inverted or more; Newton's own matrix misses 4.6 % from 45° at κ < 1e3 in float64."""
+    """Of 1,760, half of them inverted or more; Newton's own matrix misses 4.6 % from 45° at κ < 1e3 in float64."""
     posed = problem(dtype, limit)
     assert np.mean(np.linalg.det(posed.matrices) < 0) > 0.5
     assert posed.outside(repeat("newton", posed.matrices, posed.near, 5)) <= (0.002 if limit > 10 else 0)
     assert posed.outside(repeat("newton", posed.matrices, posed.anywhere, 8)) == 0
-    left = np.asarray(advance("newton", 0, escape=True)(posed.matrices, posed.anywhere))
+    left = np.asarray(leave(posed.matrices, posed.anywhere))
     assert posed.outside(repeat("newton", posed.matrices, left, 16)) == 0
 
 
@@ -121,6 +129,16 @@ def test_saddles_repel_newton(dtype):
     off = turns(np.random.default_rng(2), len(posed.matrices), 0.01)
     for start in starts:
         assert posed.outside(repeat("newton", posed.matrices, (start @ off).astype(dtype), 10)) == 0
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_newton_passes_a_quarter_turn_about_the_weakest_axis(dtype):
+    """There the gap of that axis vanishes and the torque about it does not, as small as it is."""
+    posed = problem(dtype, 1000)
+    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    axes = np.asarray(posed.axes, float)
+    start = np.asarray(posed.nearest, float) @ axes @ quarter @ axes.swapaxes(1, 2)
+    assert posed.outside(repeat("newton", posed.matrices, start.astype(dtype), 8)) < 0.002
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -139,11 +157,25 @@ def test_cayley_reaches_the_contract_from_45_degrees(dtype):
 
 @pytest.mark.parametrize("step", STEPS)
 def test_every_step_stands_still_an_exact_half_turn_off_and_escape_leaves_it(step):
-    starts = half_turn_starts(np.eye(3))[:3]
-    matrix = np.diag([3.0, 2, 1])
-    np.testing.assert_allclose(repeat(step, np.broadcast_to(matrix, (3, 3, 3)), starts, 8), starts, atol=1e-15)
-    left = advance(step, 1, escape=True)(matrix, starts)
-    np.testing.assert_allclose(left, np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-15)
+    starts = np.resize(half_turn_starts(np.eye(3))[:3], (COUNT, 3, 3))
+    matrices = np.broadcast_to(np.diag([3.0, 2, 1]), starts.shape)
+    np.testing.assert_allclose(repeat(step, matrices, starts, 4), starts, atol=1e-15)
+    left = np.asarray(leave(matrices, starts))
+    np.testing.assert_allclose(repeat(step, matrices, left, 1), np.broadcast_to(np.eye(3), starts.shape), atol=1e-15)
+
+
+def test_the_best_angle_about_any_axis_is_found():
+    """The axes of the steps are of ascent; here it lies behind as often as before, and beyond 90° too."""
+    random = np.random.default_rng(5)
+    matrices, axes = random.standard_normal((200, 3, 3)), random.standard_normal((200, 3))
+    correction = turn_about(_mat3.components(jnp.asarray(matrices)), (axes[:, 0], axes[:, 1], axes[:, 2]))
+    reached = np.einsum("nij,nij->n", _mat3.stack(_quaternion.to_rotation(correction)), matrices)
+    unit = axes / np.linalg.norm(axes, axis=1)[:, None]
+    constant = np.einsum("ni,nij,nj->n", unit, matrices, unit)
+    d = np.stack([matrices[:, 2, 1], matrices[:, 0, 2], matrices[:, 1, 0]], 1)
+    d -= np.stack([matrices[:, 1, 2], matrices[:, 2, 0], matrices[:, 0, 1]], 1)
+    best = constant + np.hypot(np.trace(matrices, axis1=1, axis2=2) - constant, np.einsum("ni,ni->n", d, unit))
+    np.testing.assert_allclose(reached, best, atol=1e-13)
 
 
 @functools.lru_cache
@@ -175,7 +207,7 @@ def test_every_step_stays_a_rotation_on_every_family_and_the_best_angle_never_lo
 @pytest.mark.parametrize("step", STEPS)
 def test_the_angle_about_the_axis_of_a_matrix_of_rank_one_is_kept(step, dtype):
     """A = u vᵀ: v turns to u in the plane of Qv and u, which is the shortest way, and nothing else turns."""
-    random, count = np.random.default_rng(4), 500
+    random, count = np.random.default_rng(4), COUNT
     u, v = turns(random, count)[:, :, 0], turns(random, count)[:, :, 0]
     start = turns(random, count)
     image = np.einsum("nij,nj->ni", start, v)
@@ -185,7 +217,9 @@ def test_the_angle_about_the_axis_of_a_matrix_of_rank_one_is_kept(step, dtype):
     cosine = np.einsum("ni,ni->n", image, u)[:, None, None]
     expected = (np.eye(3) + product + product @ product / (1 + cosine)) @ start
     matrices = (u[:, :, None] * v[:, None, :]).astype(dtype)
-    refined = repeat(step, matrices, start.astype(dtype), 60 if step == "torque" else 6)
+    refined = repeat(step, matrices, start.astype(dtype), 60 if step == "torque" else 16)
     error = np.abs(refined - expected)[within]
     eps = np.finfo(dtype).eps
-    assert error.max() < (64 * eps**0.5 if step == "quest" else 500 * eps), error.max() / eps
+    # The torque step turns often where the trace is nearly 0; the root of `quest` has half the digits.
+    bound = {"torque": 2e4 * eps, "torque_exact_angle": 500 * eps, "quest": 64 * eps**0.5}.get(step, 32 * eps)
+    assert error.max() < bound, error.max() / eps
