@@ -43,7 +43,7 @@ def refine_rotation(
         Shares *outside* the error 8 eps (1+κ), κ = s1/(s2+s3), of 170,000 matrices (`cayley`, `quest`: 20,000) of each
         population, Gaussian, κ log-uniform, s2 and s3 log-uniform; the worst of them, float32 and float64. `newton`:
         from 45° off after 5 steps none for κ < 10, 0.05 % for κ < 1e3; from uniformly random starts after 8 steps one
-        matrix for κ < 1e3, after 16 with `escape` none. `cayley`: from 45° off after 5 steps none for κ < 10, 2.4 % for
+        matrix for κ < 1e3, after 16 with `escape` none. `cayley`: from 45° off after 5 steps none for κ < 10, 2.7 % for
         κ < 1e3. `quest`: none for κ < 10, 0.3 % in float32 and none in float64 for κ < 1e3. The linear steps need tens.
 
     Raises:
