@@ -60,7 +60,7 @@ def computed_once(m: Mat3) -> Mat3:
     """The matrix itself, which XLA:CPU then computes once for all that is made of it.
 
     What is cheap it computes again in every fusion, and a step of many quotients has many; what is divided it keeps. To
-    divide QᵀA by 1 takes a `newton` step from 103 to about 65 ns a matrix, and each result sees the same rounding of it.
+    divide QᵀA by 1 takes a `newton` step from 103 to 65 ns a matrix, and each result sees the same rounding of it.
     """
     number = 1 + jnp.abs(m[0][0])
     one = number / number
