@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import decided_once
+from jaxrot._scaling import computed_once
 
 # A minor below 16 eps tr(h)² is rounding. Where two eigenvalues are below it the choice is left to the third one.
 _NOISE = 16
@@ -49,7 +49,7 @@ def null_vector(h: Mat3) -> Vec3:
     shift = _NOISE * eps * size
     a0, a1, a2 = h00 + shift, h11 + shift, h22 + shift
     minors = (jnp.abs(a1 * a2 - h12 * h12), jnp.abs(a0 * a2 - h02 * h02), jnp.abs(a0 * a1 - h01 * h01))
-    k = decided_once(largest(minors), size)
+    k = computed_once(largest(minors))
 
     # The remaining two, i and j, follow k in the cyclic order, so that one formula serves all three.
     hii, hij, hjj = choose(k, h11, h22, h00), choose(k, h12, h02, h01), choose(k, h22, h00, h11)

@@ -15,14 +15,13 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
+from jaxrot._complex import add, multiply, reciprocal, square, subtract, times
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import power_of_two_factor
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
 _RESOLVED = 64
-
-_Complex = tuple[jax.Array, jax.Array]  # real and imaginary part: the pairs fuse like everything else
 
 
 def rotation_tangent(
@@ -52,9 +51,9 @@ def angular_tangent(
     r = _mat3.components(rotation)
     stretch = _mat3.transpose_multiply(r, _mat3.components(_normalised(matrix, rotation, order + 1)))
     factor = _factor(matrix)
-    # The factor is applied in two halves, before and after: at once it could overflow or underflow on one side. Both are
-    # divisions, because XLA:CPU stores quotients and forms products again in each entry of the result, and the
-    # transpose, the reverse mode, has them in the other order: with products the reverse mode took 1.7 times as long.
+    # The factor is applied in two halves, before and after: at once it could overflow or underflow on one side. Both
+    # are divisions, because XLA:CPU stores quotients and forms products again in each entry of the result; the
+    # transpose, the reverse mode, has them in the other order. With products it took 1.7 times as long.
     first_half = power_of_two_factor(lax.rsqrt(jnp.where(factor > 0, factor, jnp.ones_like(factor))))
     inverse, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(stretch, damping))
     torque = _divided(_mat3.axial(_mat3.transpose_multiply(r, _mat3.components(matrix_dot))), 1 / first_half)
@@ -65,9 +64,9 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
     """H(H²+δ²)⁻¹ = Re (H+iδ)⁻¹, and about the largest singular value of (H+iδ)⁻¹.
 
     By LDLᵀ of the complex symmetric H+iδ. Its real and imaginary parts are both semidefinite, so that nothing need be
-    exchanged (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts", 1998).
-    The closed form through the adjugate is shorter and loses eps κ² where two gaps are small (near −R): the Jacobian was
-    off by 7e3 eps κ there, with LDLᵀ by a few eps κ.
+    exchanged (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts",
+    1998). The closed form through the adjugate is shorter and loses eps κ² where two gaps are small (near −R): the
+    Jacobian was off by 7e3 eps κ there, with LDLᵀ by a few eps κ.
 
     Args:
         h: Symmetric, positive semidefinite to rounding.
@@ -77,20 +76,20 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
         The symmetric matrix, and the largest modulus on the diagonal of (H+iδ)⁻¹: at least a third of its norm.
     """
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
-    r0 = _reciprocal((h00, delta))
-    l1, l2 = _times(r0, h01), _times(r0, h02)
+    r0 = reciprocal((h00, delta))
+    l1, l2 = times(r0, h01), times(r0, h02)
     s12 = (h12 - l1[0] * h02, -l1[1] * h02)
-    r1 = _reciprocal((h11 - l1[0] * h01, delta - l1[1] * h01))
-    l12 = _multiply(s12, r1)
-    r2 = _reciprocal(_subtract((h22 - l2[0] * h02, delta - l2[1] * h02), _multiply(l12, s12)))
+    r1 = reciprocal((h11 - l1[0] * h01, delta - l1[1] * h01))
+    l12 = multiply(s12, r1)
+    r2 = reciprocal(subtract((h22 - l2[0] * h02, delta - l2[1] * h02), multiply(l12, s12)))
 
     # notation: the columns of L⁻ᵀ are (1, 0, 0), (−l1, 1, 0), (c, −l12, 1).
-    c = _subtract(_multiply(l1, l12), l2)
-    last = _multiply(l12, r2)
-    m00 = _add(r0, _add(_multiply(l1, _multiply(l1, r1)), _multiply(c, _multiply(c, r2))))
-    m01 = _add(_multiply(l1, r1), _multiply(c, last))
-    m02, m11 = _multiply(c, r2), _add(r1, _multiply(l12, last))
-    largest = jnp.maximum(jnp.maximum(_square(m00), _square(m11)), _square(r2))
+    c = subtract(multiply(l1, l12), l2)
+    last = multiply(l12, r2)
+    m00 = add(r0, add(multiply(l1, multiply(l1, r1)), multiply(c, multiply(c, r2))))
+    m01 = add(multiply(l1, r1), multiply(c, last))
+    m02, m11 = multiply(c, r2), add(r1, multiply(l12, last))
+    largest = jnp.maximum(jnp.maximum(square(m00), square(m11)), square(r2))
     inverse = ((m00[0], -m01[0], m02[0]), (-m01[0], m11[0], -last[0]), (m02[0], -last[0], r2[0]))
     return inverse, jnp.sqrt(largest)
 
@@ -146,28 +145,3 @@ def _divided(v: Vec3, divisor: jax.Array) -> Vec3:
     # The maximum keeps XLA from turning x/(y/z) into (x z)/y, which overflows.
     divisor = jnp.maximum(divisor, float(jnp.finfo(divisor.dtype).tiny))
     return (v[0] / divisor, v[1] / divisor, v[2] / divisor)
-
-
-def _times(a: _Complex, real: jax.Array) -> _Complex:
-    return a[0] * real, a[1] * real
-
-
-def _add(a: _Complex, b: _Complex) -> _Complex:
-    return a[0] + b[0], a[1] + b[1]
-
-
-def _subtract(a: _Complex, b: _Complex) -> _Complex:
-    return a[0] - b[0], a[1] - b[1]
-
-
-def _multiply(a: _Complex, b: _Complex) -> _Complex:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _square(a: _Complex) -> jax.Array:
-    return a[0] * a[0] + a[1] * a[1]
-
-
-def _reciprocal(a: _Complex) -> _Complex:
-    square = _square(a)
-    return a[0] / square, -a[1] / square

@@ -43,6 +43,12 @@ def scale_vector(v: Vec3, factor: jax.Array | float) -> Vec3:
     return (v[0] * factor, v[1] * factor, v[2] * factor)
 
 
+def add_to_diagonal(m: Mat3, number: jax.Array) -> Mat3:
+    """The matrix m + number·1."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = m
+    return ((xx + number, xy, xz), (yx, yy + number, yz), (zx, zy, zz + number))
+
+
 def transpose(m: Mat3) -> Mat3:
     """The transpose."""
     (a, b, c), (d, e, f), (g, h, i) = m

@@ -29,25 +29,37 @@ def refine_rotation(
         step: A name in `STEPS`. Static.
         iterations: How many steps, ≥ 0. Static.
         escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
-            about three torque steps, and nothing when it is off.
+            about one step more, and nothing when it is off.
 
     Returns:
-        A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`. With
-        `torque` the error shrinks by max|sᵢ| / |Σsᵢ| a step.
+        A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`.
+
+    Convergence:
+        `torque`: linear, the error shrinks by max|sᵢ| / |Σsᵢ| a step. `torque_exact_angle`: linear, about half the
+        steps, and one for a multiple of a rotation; the trace never gets smaller. `newton`: cubic, from any start, the
+        trace never gets smaller. `cayley`: cubic, from within 90°. `quest`: exact in one step but near a half turn, as
+        far as the sum of the singular values is.
+
+        Shares *outside* the error 8 eps (1+κ), κ = s1/(s2+s3), of 170,000 matrices (`cayley`, `quest`: 20,000) of each
+        population, Gaussian, κ log-uniform, s2 and s3 log-uniform; the worst of them, float32 and float64. `newton`:
+        from 45° off after 5 steps none for κ < 10, 0.05 % for κ < 1e3; from uniformly random starts after 8 steps one
+        matrix for κ < 1e3, after 16 with `escape` none. `cayley`: from 45° off after 5 steps none for κ < 10, 2.7 % for
+        κ < 1e3. `quest`: none for κ < 10, 0.3 % in float32 and none in float64 for κ < 1e3. The linear steps need tens.
 
     Raises:
         ValueError: Wrong shape, unknown step, negative iterations.
         TypeError: Complex or non-numeric arrays, traced step, iterations or escape.
 
     Uniqueness:
-        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) `torque` stands still,
-        unless `escape` is on.
+        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) every step stands
+        still, unless `escape` is on. At A = 0 the start is kept, at rank 1 its angle about the free axis (with
+        `quest` to √eps).
 
     Derivative:
         The implicit rule of `nearest_rotation`, at the rotation that was reached: right at convergence, and zero with
         respect to the start, on which the limit does not depend.
 
-    Source: Müller et al. 2016, eq. (7), with the errata stated in `steps/torque.py`.
+    Source: `STEPS[step].source`; for `torque` with the errata stated in `steps/torque.py`.
     """
     checked = check_matrix(matrix)
     start = check_start(rotation, "rotation", (3, 3), checked.value).value

@@ -1,11 +1,15 @@
 """Exact scaling by powers of two; divisions, roots and signs that are safe where their argument is 0 or rounding."""
 
+from typing import TypeVar
+
 import jax
 import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3
+
+_Tree = TypeVar("_Tree")
 
 
 def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
@@ -67,13 +71,17 @@ def is_positive(x: jax.Array) -> jax.Array:
     return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
 
 
-def decided_once(choice: jax.Array, nonzero: jax.Array) -> jax.Array:
-    """A small integer, held as a floating-point number, computed once for everything that hangs on it.
+def computed_once(values: _Tree) -> _Tree:
+    """The values themselves, one array or several, computed once for everything that hangs on them.
 
-    The same remedy as in `is_positive`, for choices among several: a quotient that XLA does not see through. The result
-    is the integer to a rounding.
+    What is cheap XLA:CPU forms again in every fusion; what is divided, by the 1 that it does not see through, it keeps.
+    That saves time where many quotients follow, and every use sees the same rounding: for choices among several this is
+    what `is_positive` is for two.
     """
-    return choice * nonzero / nonzero
+    number = 1 + jnp.abs(jax.tree.leaves(values)[0])
+    # The maximum keeps XLA from turning x/(y/y) into (x y)/y, which rounds.
+    one = jnp.maximum(number / number, 0.5)
+    return jax.tree.map(lambda value: value / one, values)
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:

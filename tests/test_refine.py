@@ -71,11 +71,13 @@ def test_what_the_matrix_does_not_determine_is_kept_from_the_start(step):
     # Rank 1: r1 turns to a1 in the plane of the two, and nothing else turns.
     a1 = np.array([0.0, 0, 2])
     refined = np.asarray(refine_rotation(np.outer(a1, [1, 0, 0]), start, step=step, iterations=200))
+    # The root that `quest` needs is double at rank 1 and has half the digits.
+    tolerance = 64 * np.finfo(float).eps ** 0.5 if step == "quest" else 1e-12
     np.testing.assert_allclose(refined[:, :, 0], np.broadcast_to([0, 0, 1], (6, 3)), atol=1e-12)
     for before, after in zip(start, refined, strict=True):
         axis = np.cross(before[:, 0], [0, 0, 1])
         angle = np.arctan2(np.linalg.norm(axis), before[2, 0])
-        np.testing.assert_allclose(after, turned(axis, angle) @ before, atol=1e-12)
+        np.testing.assert_allclose(after, turned(axis, angle) @ before, atol=tolerance)
 
 
 @pytest.mark.parametrize("step", STEPS)

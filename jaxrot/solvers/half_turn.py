@@ -6,7 +6,8 @@ import jax.numpy as jnp
 from jaxrot import _definite, _mat3, _quaternion
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import decided_once, safe_divide, scaled
+from jaxrot._scaling import computed_once, safe_divide, scaled
+from jaxrot.steps.exact_angle import turn_about
 
 # The stages that keep a promise each and that `solve` can leave out, to see what they cost.
 GUARDS = ("scale", "inversion", "weakest axis", "polish", "renormalisation")
@@ -110,7 +111,7 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
         + 2 * shifted * cofactor[i][i]
         for i in range(3)
     )
-    k = decided_once(_definite.largest((x + y + z, x - y - z, y - x - z, z - x - y)), size + tiny)
+    k = computed_once(_definite.largest((x + y + z, x - y - z, y - x - z, z - x - y)))
 
     one = jnp.ones_like(f)
     flips = (_definite.choose(k, one, one, -one, -one), _definite.choose(k, one, -one, one, -one))
@@ -138,8 +139,8 @@ def half_turn(a: Mat3, q: Quaternion, f: jax.Array) -> Quaternion:
     h, _ = _gaps_and_torque(a, q)
     trace = (h[0][0] + h[1][1] + h[2][2]) * 0.5
     sign = jnp.where(f < 0, -jnp.ones_like(f), jnp.ones_like(f))
-    stretch = _shifted(_mat3.scale(h, -sign), sign * trace)
-    x, y, z = _definite.null_vector(_shifted(stretch, -_smallest_eigenvalue(stretch)))
+    stretch = _mat3.add_to_diagonal(_mat3.scale(h, -sign), sign * trace)
+    x, y, z = _definite.null_vector(_mat3.add_to_diagonal(stretch, -_smallest_eigenvalue(stretch)))
     turned = _quaternion.product(q, (jnp.zeros_like(x), x, y, z))
     w, x, y, z = (jnp.where(f < 0, new, old) for new, old in zip(turned, q, strict=True))
     length = jnp.sqrt(_quaternion.squared_norm((w, x, y, z)))
@@ -149,33 +150,7 @@ def half_turn(a: Mat3, q: Quaternion, f: jax.Array) -> Quaternion:
 def turn_about_weakest_axis(a: Mat3, q: Quaternion) -> Quaternion:
     """The best angle about the axis of the smallest gap: tr(RᵀA) is largest on that whole circle of rotations."""
     h, torque = _gaps_and_torque(a, q)
-    return _quaternion.product(q, best_turn(h, torque, _definite.null_vector(h)))
-
-
-def best_turn(h: Mat3, torque: Vec3, axis: Vec3) -> Quaternion:
-    """The turn about an axis that makes tr(RᵀA) largest, a quaternion between 1 and 2 in length.
-
-    After a turn by φ about n the trace is const + c cos φ + s sin φ, c = nᵀHn, s = d·n: the best angle is atan2(s, c).
-
-    Args:
-        h: H = tr(B)·1 − sym B for B = QᵀA.
-        torque: d = vee(B − Bᵀ), on the same scale.
-        axis: n, of any length but 0.
-    """
-    square = _mat3.dot(axis, axis)
-    length = jnp.sqrt(square)
-    c, s = _mat3.dot(axis, _mat3.apply(h, axis)), _mat3.dot(torque, axis) * length
-    r = jnp.sqrt(s * s + c * c)
-    # (cos φ/2, sin φ/2) ∝ (r + c, s); where c < 0 that cancels, and (|s|, ±(r − c)) is the same direction.
-    cosine = jnp.where(c >= 0, r + c, jnp.abs(s))
-    sine = jnp.where(c >= 0, s, jnp.where(s < 0, c - r, r - c))
-    # Where the trace hardly depends on the angle nothing is turned: s² and c² may have underflowed too.
-    size = jnp.abs(h[0][0]) + jnp.abs(h[1][1]) + jnp.abs(h[2][2])
-    sine = jnp.where(r > float(jnp.finfo(r.dtype).eps) * size * square, sine, jnp.zeros_like(sine))
-    # The tangent of φ/4 is at most 1, and the components that share it agree where it is rounding.
-    quarter = safe_divide(sine, jnp.sqrt(cosine * cosine + sine * sine) + cosine)
-    x, y, z = _mat3.scale_vector(axis, 2 * quarter / length)
-    return (1 - quarter * quarter, x, y, z)
+    return _quaternion.product(q, turn_about(h, torque, _definite.null_vector(h), flat=0.5))
 
 
 def polish(a: Mat3, q: Quaternion) -> Quaternion:
@@ -183,7 +158,7 @@ def polish(a: Mat3, q: Quaternion) -> Quaternion:
     h, torque = _gaps_and_torque(a, q)
     info = jnp.finfo(q[0].dtype)
     trace = jnp.abs(h[0][0] + h[1][1] + h[2][2]) * 0.5
-    x, y, z = _definite.solve(_shifted(h, 8 * float(info.eps) * trace + float(info.tiny) ** 0.5), torque)
+    x, y, z = _definite.solve(_mat3.add_to_diagonal(h, 8 * float(info.eps) * trace + float(info.tiny) ** 0.5), torque)
     return _quaternion.product(q, (jnp.ones_like(x), 0.5 * x, 0.5 * y, 0.5 * z))
 
 
@@ -198,11 +173,6 @@ def _gaps_and_torque(a: Mat3, q: Quaternion) -> tuple[Mat3, Vec3]:
     return jax.tree.map(lambda entry: entry / square, (_mat3.gap_matrix(b), _mat3.axial(b)))
 
 
-def _shifted(m: Mat3, shift: jax.Array) -> Mat3:
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = m
-    return ((xx + shift, xy, xz), (yx, yy + shift, yz), (zx, zy, zz + shift))
-
-
 def _smallest_eigenvalue(s: Mat3) -> jax.Array:
     """The smallest eigenvalue of a symmetric matrix, to 3e-9 of the spread of the three.
 
@@ -210,7 +180,7 @@ def _smallest_eigenvalue(s: Mat3) -> jax.Array:
     cosine is cos(⅔ arccos u), which has no singularity on [0, 1].
     """
     mean = _mat3.trace(s) / 3
-    deviator = _shifted(s, -mean)
+    deviator = _mat3.add_to_diagonal(s, -mean)
     square = _mat3.squared_norm(deviator) / 6
     p = jnp.sqrt(square)
     r = jnp.clip(safe_divide(_mat3.determinant(deviator), 2 * square * p), -1, 1)
@@ -218,4 +188,4 @@ def _smallest_eigenvalue(s: Mat3) -> jax.Array:
     cosine = jnp.full_like(u, _COSINE[-1])
     for coefficient in reversed(_COSINE[:-1]):
         cosine = cosine * u + coefficient
-    return decided_once(mean - 2 * p * cosine, p + 1)
+    return computed_once(mean - 2 * p * cosine)

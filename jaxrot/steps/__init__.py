@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot.steps import torque
+from jaxrot.steps import cayley, newton, quest, torque, torque_exact_angle
 
 
 class Step(NamedTuple):
@@ -24,5 +24,13 @@ class Step(NamedTuple):
 
 
 STEPS: Mapping[str, Step] = MappingProxyType(
-    {"torque": Step(torque.correction, "linear, max|sᵢ| / |Σsᵢ|", "Müller et al. 2016, eq. (7)")}
+    {
+        "torque": Step(torque.correction, "linear, max|sᵢ| / |Σsᵢ|", "Müller et al. 2016, eq. (7)"),
+        "torque_exact_angle": Step(
+            torque_exact_angle.correction, "linear, one step at cR", "Müller et al. 2016, eq. (4)"
+        ),
+        "newton": Step(newton.correction, "cubic, from any start", "Kugelstadt et al. 2018"),
+        "cayley": Step(cayley.correction, "cubic, from within 90°", "Zhang 2021"),
+        "quest": Step(quest.correction, "exact in one step, but at 180°", "Shuster and Oh 1981 (QUEST)"),
+    }
 )
