@@ -1,6 +1,7 @@
 """jaxrot: the rotation in a 3×3 matrix, in batches, differentiable to any order, right for every finite input."""
 
 from jaxrot import families as families
+from jaxrot._blocks import in_blocks as in_blocks
 from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
 from jaxrot._refine import refine_quaternion_wxyz as refine_quaternion_wxyz
@@ -20,6 +21,7 @@ __all__ = [
     "Method",
     "Step",
     "families",
+    "in_blocks",
     "nearest_quaternion_wxyz",
     "nearest_rotation",
     "refine_quaternion_wxyz",

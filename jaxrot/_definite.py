@@ -7,8 +7,8 @@ unknowns end in quotients: what is rounding in one of them is then the same roun
 import jax
 import jax.numpy as jnp
 
+from jaxrot._choice import choose, computed_once, index_of_largest
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import computed_once
 
 # A minor below 16 eps tr(h)² is rounding. Where two eigenvalues are below it the choice is left to the third one.
 _NOISE = 16
@@ -49,7 +49,7 @@ def null_vector(h: Mat3) -> Vec3:
     shift = _NOISE * eps * size
     a0, a1, a2 = h00 + shift, h11 + shift, h22 + shift
     minors = (jnp.abs(a1 * a2 - h12 * h12), jnp.abs(a0 * a2 - h02 * h02), jnp.abs(a0 * a1 - h01 * h01))
-    k = computed_once(largest(minors))
+    k = computed_once(index_of_largest(minors))
 
     # The remaining two, i and j, follow k in the cyclic order, so that one formula serves all three.
     hii, hij, hjj = choose(k, h11, h22, h00), choose(k, h12, h02, h01), choose(k, h22, h00, h11)
@@ -60,23 +60,6 @@ def null_vector(h: Mat3) -> Vec3:
     ni = -(hki + hij * nj) / hii
     one = jnp.ones_like(ni)
     return choose(k, one, nj, ni), choose(k, ni, one, nj), choose(k, nj, ni, one)
-
-
-def largest(values: tuple[jax.Array, ...]) -> jax.Array:
-    """The index of the largest value, the first of equal ones, as a floating-point number."""
-    best, index = values[0], jnp.zeros_like(values[0])
-    for i, value in enumerate(values[1:], start=1):
-        index = jnp.where(value > best, jnp.full_like(index, i), index)
-        best = jnp.maximum(best, value)
-    return index
-
-
-def choose(index: jax.Array, *values: jax.Array) -> jax.Array:
-    """The value with this index."""
-    chosen = values[-1]
-    for i in reversed(range(len(values) - 1)):
-        chosen = jnp.where(index < i + 0.5, values[i], chosen)
-    return chosen
 
 
 def _away_from_zero(x: jax.Array, distance: jax.Array) -> jax.Array:

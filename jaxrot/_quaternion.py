@@ -4,8 +4,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3
+from jaxrot._choice import choose, computed_once, index_of_largest, is_positive
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import is_positive, safe_divide, safe_sqrt
+from jaxrot._scaling import safe_divide, safe_sqrt
 
 # notation: a quaternion on components is a tuple (w, x, y, z) of arrays of one batch shape.
 Quaternion = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
@@ -158,11 +159,8 @@ def longest(columns: Columns) -> tuple[Quaternion, Quaternion]:
 
 
 def _column_with_largest(columns: Columns, sizes: Quaternion) -> Quaternion:
-    (w, x, y, z), largest = columns[0], sizes[0]
-    for column, size in zip(columns[1:], sizes[1:], strict=True):
-        better = is_positive(size - largest)
-        w, x, y, z = (jnp.where(better, new, old) for new, old in zip(column, (w, x, y, z), strict=True))
-        largest = jnp.where(better, size, largest)
+    index = computed_once(index_of_largest(sizes))
+    w, x, y, z = (choose(index, *components) for components in zip(*columns, strict=True))
     return (w, x, y, z)
 
 

@@ -63,7 +63,9 @@ def refine_rotation(
     """
     checked = check_matrix(matrix)
     start = check_start(rotation, "rotation", (3, 3), checked.value).value
-    quaternion = _quaternion.stack(_quaternion.from_rotation(_mat3.components(start)))
+    # Neither its length nor its sign matters.
+    columns = _quaternion.davenport_columns(_mat3.components(start))
+    quaternion = _quaternion.stack(_quaternion.largest_column(columns))
     refined = _refine(checked.value, quaternion, step, iterations, escape)
     return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined))).astype(checked.dtype)
 

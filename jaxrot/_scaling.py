@@ -1,6 +1,4 @@
-"""Exact scaling by powers of two; divisions, roots and signs that are safe where their argument is 0 or rounding."""
-
-from typing import TypeVar
+"""Exact scaling by powers of two; divisions and roots that are safe where their argument is 0."""
 
 import jax
 import jax.numpy as jnp
@@ -8,8 +6,6 @@ from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3
-
-_Tree = TypeVar("_Tree")
 
 
 def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
@@ -59,29 +55,6 @@ def unit_scaled(m: Mat3) -> Mat3:
     m = scaled(m)
     norm = safe_sqrt(_mat3.squared_norm(m))
     return _mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm))
-
-
-def is_positive(x: jax.Array) -> jax.Array:
-    """Whether x > 0, decided once for everything that hangs on it.
-
-    XLA computes what is cheap again in every fusion, with products and sums contracted differently. Where x is 0 but
-    for rounding, one component of a result could then follow one branch and its neighbour the other: no rotation, or a
-    wrong one. A quotient is computed once.
-    """
-    return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
-
-
-def computed_once(values: _Tree) -> _Tree:
-    """The values themselves, one array or several, computed once for everything that hangs on them.
-
-    What is cheap XLA:CPU forms again in every fusion; what is divided, by the 1 that it does not see through, it keeps.
-    That saves time where many quotients follow, and every use sees the same rounding: for choices among several this is
-    what `is_positive` is for two.
-    """
-    number = 1 + jnp.abs(jax.tree.leaves(values)[0])
-    # The maximum keeps XLA from turning x/(y/y) into (x y)/y, which rounds.
-    one = jnp.maximum(number / number, 0.5)
-    return jax.tree.map(lambda value: value / one, values)
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:

@@ -9,7 +9,7 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
-    {"_complex", "_inputs", "_mat3", "_quaternion", "_scaling", "families"},
+    {"_blocks", "_choice", "_complex", "_inputs", "_mat3", "_quaternion", "_scaling", "families"},
     {"_derivative", "_definite", "_jacobi"},
     {"steps"},
     {"solvers"},

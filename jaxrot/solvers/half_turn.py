@@ -4,9 +4,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _definite, _mat3, _quaternion
+from jaxrot._choice import choose, computed_once, index_of_largest
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import computed_once, safe_divide, scaled
+from jaxrot._scaling import safe_divide, scaled
 from jaxrot.steps.exact_angle import turn_about
 
 # The stages that keep a promise each and that `solve` can leave out, to see what they cost.
@@ -111,10 +112,10 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
         + 2 * shifted * cofactor[i][i]
         for i in range(3)
     )
-    k = computed_once(_definite.largest((x + y + z, x - y - z, y - x - z, z - x - y)))
+    k = computed_once(index_of_largest((x + y + z, x - y - z, y - x - z, z - x - y)))
 
     one = jnp.ones_like(f)
-    flips = (_definite.choose(k, one, one, -one, -one), _definite.choose(k, one, -one, one, -one))
+    flips = (choose(k, one, one, -one, -one), choose(k, one, -one, one, -one))
     rows = [_mat3.scale_vector(row, sign * flip) for row, flip in zip(a, (*flips, flips[0] * flips[1]), strict=True)]
     b = (rows[0], rows[1], rows[2])
     sum_ = size * (1 + 4 * eps) + tiny
@@ -127,10 +128,10 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
     x, y, z = _definite.solve(h, _mat3.axial(b))
     # e_k ∘ (1, x, y, z), up to its sign.
     return (
-        _definite.choose(k, one, -x, -y, -z),
-        _definite.choose(k, x, one, z, -y),
-        _definite.choose(k, y, -z, one, x),
-        _definite.choose(k, z, y, -x, one),
+        choose(k, one, -x, -y, -z),
+        choose(k, x, one, z, -y),
+        choose(k, y, -z, one, x),
+        choose(k, z, y, -x, one),
     )
 
 

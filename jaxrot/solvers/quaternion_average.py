@@ -3,8 +3,10 @@
 import functools
 
 import jax
+import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._choice import choose, computed_once, index_of_largest
 from jaxrot._quaternion import Columns, Quaternion
 from jaxrot._scaling import unit_scaled
 
@@ -26,8 +28,14 @@ def solve(matrix: jax.Array) -> jax.Array:
     c = 1.5, so the scale is removed here. sign(0) counts as +1: it must not drop a column.
     """
     columns = _quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))
-    longest, _ = _quaternion.longest(columns)
-    w, x, y, z = (_quaternion.with_sign_of(_quaternion.dot(longest, column), column) for column in columns)
+    index = index_of_largest(tuple(_quaternion.squared_norm(column) for column in columns))
+    w, x, y, z = (choose(index, *components) for components in zip(*columns, strict=True))
+    # All signs in one number, and that computed once: once for the index and for each sign takes 1.3 times as long.
+    products = (_quaternion.dot((w, x, y, z), column) for column in columns)
+    zero = jnp.zeros_like(w)
+    weights = (jnp.where(product < 0, 2.0**i, zero) for i, product in enumerate(products))
+    signs = computed_once(functools.reduce(jnp.add, weights)).astype(jnp.int32)
+    w, x, y, z = (_signed((signs >> i & 1) == 1, column) for i, column in enumerate(columns))
     # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.
     return _mat3.stack(_quaternion.to_rotation(_sum((w, x, y, z))))
 
@@ -54,3 +62,8 @@ def solve_simply(matrix: jax.Array) -> jax.Array:
 
 def _sum(columns: Columns) -> Quaternion:
     return functools.reduce(_quaternion.add, columns)
+
+
+def _signed(negative: jax.Array, q: Quaternion) -> Quaternion:
+    w, x, y, z = (jnp.where(negative, -component, component) for component in q)
+    return (w, x, y, z)

@@ -4,8 +4,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3
+from jaxrot._choice import is_positive
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import is_positive, safe_sqrt
+from jaxrot._scaling import safe_sqrt
 
 
 def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:

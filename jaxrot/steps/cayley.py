@@ -4,9 +4,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import computed_once, safe_sqrt
+from jaxrot._scaling import safe_sqrt
 from jaxrot.steps.damped import damped_solve
 
 

@@ -3,9 +3,9 @@
 import jax
 import jax.numpy as jnp
 
+from jaxrot._choice import is_positive
 from jaxrot._complex import Complex, divide, multiply, reciprocal, subtract, times
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import is_positive
 
 
 def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:

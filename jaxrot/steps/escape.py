@@ -3,10 +3,11 @@
 import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._choice import is_positive
 from jaxrot._jacobi import diagonalising
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import is_positive, safe_divide, safe_sqrt
+from jaxrot._scaling import safe_divide, safe_sqrt
 
 # An eigenvalue of the gap matrix above −4 eps ‖A‖ is zero.
 _ZERO = 4

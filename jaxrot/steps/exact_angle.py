@@ -22,7 +22,7 @@ def turn_about(h: Mat3, torque: Vec3, axis: Vec3, *, flat: float = _FLAT) -> Qua
     Args:
         h: H = tr(B)·1 − sym B for B = QᵀA.
         torque: d = vee(B − Bᵀ).
-        axis: Any length. Its components must be computed once, quotients for example: see `_scaling.is_positive`.
+        axis: Any length. Its components must be computed once, quotients for example: see `_choice`.
         flat: In units of eps ‖B‖, what the trace may vary by along the circle and still count as constant.
 
     Returns:

@@ -1,9 +1,9 @@
 """Newton's axis with the best angle about it."""
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import computed_once
 from jaxrot.steps.ascent import ascent
 from jaxrot.steps.cayley import zhang_shift
 from jaxrot.steps.exact_angle import turn_about

@@ -5,9 +5,10 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import computed_once, safe_divide, safe_sqrt
+from jaxrot._scaling import safe_divide, safe_sqrt
 from jaxrot.steps.cayley import cayley_map
 
 # As many as the quartic needs near its double root, where Newton's method only halves the distance; see `solvers.foam`.
