@@ -40,6 +40,12 @@ MUTANTS = {
         "lambda entry: entry",
         ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[half_turn-float64-jit]",),
     ),
+    "half a turn about the wrong axis": Mutant(
+        "solvers/half_turn.py",
+        "-_smallest_eigenvalue(stretch)",
+        "_smallest_eigenvalue(stretch)",
+        ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[half_turn-float64-jit]",),
+    ),
     "raw solver in the rule": Mutant(
         "_nearest.py",
         "rotation = _nearest(matrix, method, damping, order + 1)",

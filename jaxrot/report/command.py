@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
-from jaxrot.report import render
+from jaxrot.report import bench, render
 from jaxrot.report.environment import describe_environment
 from jaxrot.report.errors import ReportError
 from jaxrot.report.findings import on_input, times_at_largest_batch
@@ -35,6 +35,7 @@ class _Size(NamedTuple):
 
 
 _FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 70.0)
+_QUICK_BENCH = bench.Size(100, 10_000, 100_000, (10_000, 100_000), 20, 1.0)
 _QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0)
 
 
@@ -47,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--methods", metavar="A,B,...", help=f"which of {', '.join(jaxrot.METHODS)} (all)")
     parser.add_argument("--dtype", metavar="DTYPE", help=f"{', '.join(_DTYPES)} ({_FULL.dtype}; quick: {_QUICK.dtype})")
     parser.add_argument("--batch", metavar="N,N,...", help="batch sizes to time")
+    parser.add_argument(
+        "--bench", action="store_true", help="instead: the library's own speed goals, and what each stage costs"
+    )
     parser.add_argument("--quick", action="store_true", help="under 20 seconds: one dtype, one batch size, less of all")
 
 
@@ -59,6 +63,8 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ReportError: Something the user can mend.
     """
+    if options.bench:
+        return _run_bench(options)
     size = _QUICK if options.quick else _FULL
     dtypes = _parse_dtype(options.dtype or size.dtype)
     batches = _parse_batches(options.batch) if options.batch is not None else size.batches
@@ -88,6 +94,25 @@ def run(options: argparse.Namespace) -> int:
     }
     write_files(options.out, files)
     print(render.as_terminal_text(results, given, environment, dtypes))
+    print(f"\nWritten to {options.out}: {', '.join(files)}")
+    return 0
+
+
+def _run_bench(options: argparse.Namespace) -> int:
+    fixed = ("input", "methods", "dtype", "batch")
+    for name in fixed:
+        if getattr(options, name) is not None:
+            raise ReportError(f"--bench measures a fixed list; it goes without {', '.join(f'--{x}' for x in fixed)}")
+    check_writable(options.out)
+    environment = describe_environment(("float32", "float64"))
+    with measuring_configuration(), progress(len(bench.GROUPS)) as advance:
+        measured = bench.run_bench(_QUICK_BENCH if options.quick else bench.Size(), advance)
+    files = {
+        "bench.md": render.as_bench_markdown(measured, environment).encode(),
+        "bench.json": render.as_bench_json(measured, environment).encode(),
+    }
+    write_files(options.out, files)
+    print(render.as_bench_text(measured, environment))
     print(f"\nWritten to {options.out}: {', '.join(files)}")
     return 0
 

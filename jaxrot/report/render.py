@@ -8,10 +8,21 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from jaxrot.report.accuracy import Accuracy
+from jaxrot.report.bench import Bench
 from jaxrot.report.findings import findings
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.tables import Table, accuracy_table, as_markdown, as_text, sets_table, summary_table, timing_table
+from jaxrot.report.tables import (
+    Table,
+    accuracy_table,
+    as_markdown,
+    as_text,
+    goals_table,
+    sets_table,
+    stages_table,
+    summary_table,
+    timing_table,
+)
 from jaxrot.report.timing import Timing
 
 _CONTRACT = """\
@@ -25,6 +36,11 @@ _TIMES = """\
 Median (quartiles) over rounds in which every method runs once, in random order, on a batch filled with matrices of
 the input; compiled and warmed up beforehand, each call waited for. Compile time is that of the largest batch
 timed in every dtype, without a cache."""
+
+_BENCH = """\
+Gaussian matrices, float32 where not said otherwise. Ratios of times are medians and quartiles over rounds in which
+every function of a group runs once, in random order; compiled and warmed up beforehand, each call waited for. The copy
+is `A * c`, into a new array. *In blocks*: `in_blocks`. Outside the contract: matrices of all families."""
 
 _VERDICTS = """\
 Matrices outside the contract: `·` none, **bold** inside the method's own domain (a broken promise), (in parentheses)
@@ -53,8 +69,7 @@ def as_report_markdown(
 
 def as_terminal_text(results: Results, given: Input, environment: Mapping[str, str], dtypes: Sequence[str]) -> str:
     """What the command prints: header, one table a dtype, findings."""
-    width = max(map(len, environment))
-    parts = ["\n".join(f"{name.ljust(width)}  {value}" for name, value in environment.items())]
+    parts = [_columns(environment)]
     parts += [as_text(summary_table(results, dtype, given.name)) for dtype in dtypes]
     parts.append(
         "outside: matrices outside the contract; own: of these, inside the domain the method declares;\n"
@@ -98,6 +113,36 @@ def as_csv(results: Results) -> str:
             times += [getattr(timing, column, None) for column in columns]
         writer.writerow([*entry, *times])
     return text.getvalue()
+
+
+def as_bench_markdown(bench: Bench, environment: Mapping[str, str]) -> str:
+    """bench.md: header and the two tables."""
+    parts = ["# Speed of jaxrot", _header(environment), _BENCH]
+    for table in (goals_table(bench.goals), stages_table(bench.stages)):
+        parts += [f"## {table.title}", as_markdown(table)]
+    return "\n\n".join(parts) + "\n"
+
+
+def as_bench_text(bench: Bench, environment: Mapping[str, str]) -> str:
+    """What the command prints."""
+    tables = (goals_table(bench.goals), stages_table(bench.stages))
+    return "\n\n".join([_columns(environment), *map(as_text, tables)])
+
+
+def as_bench_json(bench: Bench, environment: Mapping[str, str]) -> str:
+    """bench.json: everything measured."""
+    content = {
+        "environment": dict(environment),
+        "goals": [goal._asdict() | {"is_met": goal.is_met} for goal in bench.goals],
+        "stages": [stage._asdict() for stage in bench.stages],
+        "nanoseconds": bench.nanoseconds,
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _columns(environment: Mapping[str, str]) -> str:
+    width = max(map(len, environment))
+    return "\n".join(f"{name.ljust(width)}  {value}" for name, value in environment.items())
 
 
 def _header(environment: Mapping[str, str]) -> str:

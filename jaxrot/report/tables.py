@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jaxrot
 from jaxrot.report.accuracy import Accuracy
+from jaxrot.report.bench import Goal, Stage
 from jaxrot.report.domain import describe_domain
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.measurement import WHOLE, Results
@@ -139,3 +140,36 @@ def _verdict(entry: Accuracy) -> str:
         return f"({entry.outside:,})"
     beyond = entry.outside - entry.outside_in_domain
     return f"**{entry.outside_in_domain:,}**" + (f" ({beyond:,})" if beyond else "")
+
+
+def goals_table(goals: list[Goal]) -> Table:
+    """The goals as a table of words."""
+    rows = [
+        [
+            goal.what,
+            f"{goal.batch:,}",
+            number(goal.median),
+            f"{number(goal.quartile_1)}-{number(goal.quartile_3)}",
+            ("≥ " if goal.at_least else "≤ ") + number(goal.bound),
+            "yes" if goal.is_met else "no",
+        ]
+        for goal in goals
+    ]
+    return Table("Speed", ["what", "batch", "median", "quartiles", "goal", "met"], rows)
+
+
+def stages_table(stages: list[Stage]) -> Table:
+    """The stages as a table of words."""
+    rows = []
+    for stage in stages:
+        broken = sorted(set().union(*stage.broken.values()))
+        rows.append(
+            [
+                stage.name or "nothing",
+                " / ".join(number(value) for value in stage.nanoseconds.values()),
+                " / ".join(f"{value:,}" for value in stage.outside.values()),
+                ", ".join(broken[:6]) + (f" and {len(broken) - 6} more" if len(broken) > 6 else "") or "none",
+            ]
+        )
+    header = ["left out", "ns a matrix, float32 / float64", "outside the contract", "families that break"]
+    return Table("What the stages of the default method cost", header, rows)

@@ -1,0 +1,223 @@
+"""`report --bench`: the library's own speed goals, as ratios measured side by side, and what each stage costs."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxrot
+from jaxrot.families import FAMILIES
+from jaxrot.report.accuracy import measure_errors
+from jaxrot.report.judging import judge
+from jaxrot.report.timing import compile_method, interleave
+from jaxrot.solvers import half_turn
+
+
+class Size(NamedTuple):
+    """How large the batches are, and how long a group of functions is timed."""
+
+    small: int = 100
+    middle: int = 100_000
+    large: int = 1_000_000
+    growth: tuple[int, ...] = (10_000, 100_000, 1_000_000, 10_000_000)
+    matrices_a_family: int = 500
+    budget_s: float = 12.0
+
+
+class Goal(NamedTuple):
+    """One line of the table.
+
+    Attributes:
+        what: The quantity.
+        batch: Matrices in a call.
+        median: Of the ratios in each round, where all functions run once; or the one value there is.
+        quartile_1: A quarter of the rounds had less.
+        quartile_3: A quarter of the rounds had more.
+        bound: What is aimed at.
+        at_least: The bound is a lower one.
+    """
+
+    what: str
+    batch: int
+    median: float
+    quartile_1: float
+    quartile_3: float
+    bound: float
+    at_least: bool
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the median keeps the bound."""
+        return self.median >= self.bound if self.at_least else self.median <= self.bound
+
+
+class Stage(NamedTuple):
+    """What leaving one stage of the default method out saves and breaks.
+
+    Attributes:
+        name: The stage, "" for none.
+        nanoseconds: Median a matrix, by dtype.
+        broken: Families with a matrix outside the contract, by dtype.
+        outside: Matrices outside it, by dtype.
+    """
+
+    name: str
+    nanoseconds: Mapping[str, float]
+    broken: Mapping[str, tuple[str, ...]]
+    outside: Mapping[str, int]
+
+
+class Bench(NamedTuple):
+    """Everything that `--bench` measures; `nanoseconds` are medians a matrix by function and batch."""
+
+    goals: list[Goal]
+    stages: list[Stage]
+    nanoseconds: dict[str, float]
+
+
+GROUPS = ("at 1e5", "at 1e6", "growth", "small", "compile times", "stages")
+
+
+def run_bench(size: Size, advance: Callable[[str], object]) -> Bench:
+    """Measures all groups, inside `measuring_configuration`; `advance` is called before each."""
+    bench = Bench([], [], {})
+    for name, group in zip(GROUPS, (_middle, _large, _growth, _small, _compile_times, _stages), strict=True):
+        advance(f"bench: {name}")
+        group(bench, size)
+    return bench
+
+
+def _gaussian(count: int, dtype: str = "float32") -> jax.Array:
+    return jnp.asarray(np.random.default_rng(0).standard_normal((count, 3, 3), np.float32), dtype)
+
+
+def _copy(matrix: jax.Array) -> jax.Array:
+    return matrix * 1.5
+
+
+def _with_pullback(matrix: jax.Array) -> tuple[jax.Array, jax.Array]:
+    rotation, pullback = jax.vjp(jaxrot.nearest_rotation, matrix)
+    return rotation, pullback(matrix)[0]
+
+
+def _method(name: str) -> Callable[[jax.Array], jax.Array]:
+    return lambda matrix: jaxrot.nearest_rotation(matrix, method=name)
+
+
+def _newton(matrix: jax.Array, rotation: jax.Array) -> jax.Array:
+    return jaxrot.refine_rotation(matrix, rotation, step="newton", iterations=1)
+
+
+def _time(bench: Bench, functions: Mapping[str, tuple[Callable, tuple]], size: Size) -> dict[str, np.ndarray]:
+    """Seconds in every round, by name; adds the medians a matrix to the bench."""
+    compiled = {name: jax.jit(function).lower(*given).compile() for name, (function, given) in functions.items()}
+
+    def call(name: str) -> Callable[[], object]:
+        return lambda: jax.block_until_ready(compiled[name](*functions[name][1]))
+
+    samples, _ = interleave({name: call(name) for name in functions}, budget_s=size.budget_s)
+    for name, seconds in samples.items():
+        batch = len(functions[name][1][0])
+        bench.nanoseconds[f"{name}, batch {batch:,}"] = float(np.median(seconds)) / batch * 1e9
+    return {name: np.asarray(seconds) for name, seconds in samples.items()}
+
+
+def _add(bench: Bench, what: str, batch: int, ratio: np.ndarray, bound: float, at_least: bool = False) -> None:
+    first, median, third = np.quantile(ratio, [0.25, 0.5, 0.75]).tolist()
+    bench.goals.append(Goal(what, batch, median, first, third, bound, at_least))
+
+
+def _middle(bench: Bench, size: Size) -> None:
+    batch = size.middle
+    a, wide = _gaussian(batch), _gaussian(batch, "float64")
+    warm = jaxrot.nearest_rotation(a + 0.05)
+    functions = {
+        "default": (jaxrot.nearest_rotation, (a,)),
+        "svd": (_method("svd"), (a,)),
+        "newton step": (_newton, (a, warm)),
+        "quaternion_average": (_method("quaternion_average"), (a,)),
+        "value and VJP": (_with_pullback, (a,)),
+        "default, float64": (jaxrot.nearest_rotation, (wide,)),
+    }
+    t = _time(bench, functions, size)
+    _add(bench, "svd over default", batch, t["svd"] / t["default"], 25, at_least=True)
+    _add(bench, "svd over one newton step", batch, t["svd"] / t["newton step"], 100, at_least=True)
+    _add(bench, "svd over quaternion_average", batch, t["svd"] / t["quaternion_average"], 100, at_least=True)
+    _add(bench, "value and VJP over value", batch, t["value and VJP"] / t["default"], 2.5)
+    _add(bench, "float64 over float32", batch, t["default, float64"] / t["default"], 2.5)
+
+
+def _large(bench: Bench, size: Size) -> None:
+    batch = size.large
+    a = _gaussian(batch)
+    warm = jaxrot.in_blocks(jaxrot.nearest_rotation)(a + 0.05)
+    functions = {
+        "copy": (_copy, (a,)),
+        "svd": (_method("svd"), (a,)),
+        "default at once": (jaxrot.nearest_rotation, (a,)),
+        "default in blocks": (jaxrot.in_blocks(jaxrot.nearest_rotation), (a,)),
+        "newton step in blocks": (jaxrot.in_blocks(_newton), (a, warm)),
+        "quaternion_average in blocks": (jaxrot.in_blocks(_method("quaternion_average")), (a,)),
+    }
+    t = _time(bench, functions, size)
+    _add(bench, "svd over default in blocks", batch, t["svd"] / t["default in blocks"], 20, at_least=True)
+    _add(bench, "default in blocks over copy", batch, t["default in blocks"] / t["copy"], 4)
+    _add(bench, "default at once over copy", batch, t["default at once"] / t["copy"], 4)
+    _add(bench, "newton step in blocks over copy", batch, t["newton step in blocks"] / t["copy"], 2)
+    _add(bench, "quaternion_average in blocks over copy", batch, t["quaternion_average in blocks"] / t["copy"], 2)
+    memory = jax.jit(functions["default in blocks"][0]).lower(a).compile().memory_analysis()
+    if memory is not None:
+        _add(bench, "MiB beside input and output, in blocks", batch, np.array(memory.temp_size_in_bytes / 2**20), 64)
+
+
+def _growth(bench: Bench, size: Size) -> None:
+    functions = {
+        f"default in blocks of the batch {count:,}": (jaxrot.in_blocks(jaxrot.nearest_rotation), (_gaussian(count),))
+        for count in size.growth
+    }
+    t = _time(bench, functions, size)
+    a_matrix = np.stack([seconds / count for seconds, count in zip(t.values(), size.growth, strict=True)])
+    _add(bench, "slowest over fastest batch, a matrix", size.growth[-1], a_matrix.max(0) / a_matrix.min(0), 1.5)
+
+
+def _small(bench: Bench, size: Size) -> None:
+    exact = [name for name, method in jaxrot.METHODS.items() if method.exact]
+    for batch in (1, size.small):
+        a = _gaussian(batch)
+        t = _time(bench, {name: (_method(name), (a,)) for name in exact}, size)
+        fastest = np.min([seconds for name, seconds in t.items() if name != jaxrot.DEFAULT_METHOD], axis=0)
+        _add(bench, "default over the fastest exact method", batch, t[jaxrot.DEFAULT_METHOD] / fastest, 1.3)
+
+
+def _compile_times(bench: Bench, size: Size) -> None:
+    compile_method(_copy, 1, "float32")  # the first compilation of a process pays for everybody's
+    seconds = {name: compile_method(_method(name), size.middle + 1, "float32").compile_s for name in jaxrot.METHODS}
+    slowest = max(seconds, key=lambda name: seconds[name])
+    for name in dict.fromkeys((jaxrot.DEFAULT_METHOD, slowest)):
+        _add(bench, f"seconds to compile {name}", size.middle + 1, np.array(seconds[name]), 1.5)
+
+
+def _stages(bench: Bench, size: Size) -> None:
+    nanoseconds: dict[str, dict[str, float]] = {name: {} for name in ("", *half_turn.GUARDS)}
+    outside: dict[str, dict[str, int]] = {name: {} for name in nanoseconds}
+    broken: dict[str, dict[str, tuple[str, ...]]] = {name: {} for name in nanoseconds}
+
+    def solver(name: str) -> Callable[[jax.Array], jax.Array]:
+        return lambda matrix: half_turn.solve(matrix, without=(name,) if name else ())
+
+    for dtype in ("float32", "float64"):
+        a = _gaussian(size.middle, dtype)
+        samples = _time(bench, {name: (solver(name), (a,)) for name in nanoseconds}, size)
+        sets = {
+            name: family.sample(size.matrices_a_family, dtype=np.dtype(dtype), seed=0).matrices
+            for name, family in FAMILIES.items()
+        }
+        judged = judge(sets, dtype)
+        for name in nanoseconds:
+            nanoseconds[name][dtype] = float(np.median(samples[name])) / size.middle * 1e9
+            wrong = measure_errors(np.asarray(jax.jit(solver(name))(judged.matrices)), judged).is_outside
+            outside[name][dtype] = int(wrong.sum())
+            broken[name][dtype] = tuple(family for family, part in judged.sets.items() if wrong[part].any())
+    bench.stages.extend(Stage(name, nanoseconds[name], broken[name], outside[name]) for name in nanoseconds)

@@ -1,0 +1,76 @@
+"""`report --bench`, on tiny batches and with few methods."""
+
+import json
+
+import pytest
+
+import jaxrot
+from jaxrot.__main__ import main
+from jaxrot.report import bench
+from jaxrot.report.bench import Goal
+from jaxrot.report.tables import goals_table
+
+FEW = ("half_turn", "svd", "foam", "quaternion_average")
+
+
+@pytest.fixture(scope="module")
+def measured():
+    steps = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jaxrot, "METHODS", {name: jaxrot.METHODS[name] for name in FEW})
+        patch.setattr(bench.half_turn, "GUARDS", ("inversion",))
+        # Few shapes: compiling is what costs, and the same program at the same shape is compiled once.
+        size = bench.Size(2, 32, 32, (32, 48), matrices_a_family=3, budget_s=0.0)
+        return bench.run_bench(size, steps.append), steps
+
+
+def test_every_goal_is_measured_at_its_batch(measured):
+    result, steps = measured
+    assert steps == [f"bench: {name}" for name in bench.GROUPS]
+    batches = {goal.what: goal.batch for goal in result.goals}
+    assert batches["svd over default"] == batches["value and VJP over value"] == 32
+    assert batches["svd over default in blocks"] == batches["MiB beside input and output, in blocks"] == 32
+    assert batches["slowest over fastest batch, a matrix"] == 48
+    assert {goal.batch for goal in result.goals if "fastest exact" in goal.what} == {1, 2}
+    assert all(0 < goal.quartile_1 <= goal.median <= goal.quartile_3 for goal in result.goals)
+
+
+def test_a_ratio_is_that_of_the_times_it_names(measured):
+    result, _ = measured
+    times = result.nanoseconds
+    (goal,) = (goal for goal in result.goals if goal.what == "svd over default")
+    ratio = times["svd, batch 32"] / times["default, batch 32"]
+    assert ratio / 4 < goal.median < ratio * 4
+
+
+def test_the_stages_are_timed_and_what_breaks_without_them_is_named(measured):
+    stages = {stage.name: stage for stage in measured[0].stages}
+    assert set(stages) == {"", "inversion"}
+    assert stages[""].outside == {"float32": 0, "float64": 0}
+    assert "minus_rotation_1e-1" in stages["inversion"].broken["float32"]
+    assert all(value > 0 for stage in stages.values() for value in stage.nanoseconds.values())
+
+
+@pytest.mark.parametrize(("median", "at_least", "met"), [(3, True, "yes"), (3, False, "no"), (1, False, "yes")])
+def test_a_goal_is_met_on_its_own_side(median, at_least, met):
+    (row,) = goals_table([Goal("what", 10, median, median, median, 2, at_least)]).rows
+    assert row[-1] == met
+
+
+def test_the_command_writes_and_prints_both_tables(measured, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(bench, "run_bench", lambda size, advance: measured[0])
+    assert main(["report", "--bench", "--out", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    text = (tmp_path / "out" / "bench.md").read_text(encoding="utf-8")
+    for words in (shown, text):
+        assert "svd over default in blocks" in words
+        assert "inversion" in words
+    content = json.loads((tmp_path / "out" / "bench.json").read_text(encoding="utf-8"))
+    assert len(content["goals"]) == len(measured[0].goals)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"bench.md", "bench.json"}
+
+
+def test_options_that_the_bench_does_not_take_are_refused(tmp_path, capsys):
+    assert main(["report", "--bench", "--methods", "svd", "--out", str(tmp_path / "out")]) == 2
+    assert "--bench measures a fixed list" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
