@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import export
 
 from jaxrot import in_blocks, nearest_rotation, refine_rotation
 
@@ -62,8 +63,8 @@ def test_the_temporary_arrays_are_those_of_a_block():
 
 
 def test_a_symbolic_batch_goes_through_at_once():
-    exported = jax.export.export(jax.jit(in_blocks(nearest_rotation, 10)))(
-        jax.ShapeDtypeStruct(jax.export.symbolic_shape("batch, 3, 3"), np.float64)
+    exported = export.export(jax.jit(in_blocks(nearest_rotation, 10)))(
+        jax.ShapeDtypeStruct(export.symbolic_shape("batch, 3, 3"), np.float64)
     )
     np.testing.assert_allclose(exported.call(A), nearest_rotation(A), atol=1e-14)
 

@@ -49,7 +49,7 @@ def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
     Returns:
         (..., 3, 3) rotations that keep every line of the contract; NaN where the matrix is not finite.
 
-    Cost: about 1,000 flops, 50 divisions and square roots.
+    Cost: about 1,100 flops in float32 and float64 alike, 87 divisions and 14 square roots.
     Source: Markley 1993 for the quartic; Higham and Noferini 2016 for the null vector; Wahba's problem on a circle of
     rotations. That R(A) and R(−A) differ by half a turn: −A = R(−A) S makes R(A) = R(−A) R(−S), and −1 + 2 n nᵀ
     maximises −tr(RᵀS).
@@ -118,12 +118,12 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
     flips = (choose(k, one, one, -one, -one), choose(k, one, -one, one, -one))
     rows = [_mat3.scale_vector(row, sign * flip) for row, flip in zip(a, (*flips, flips[0] * flips[1]), strict=True)]
     b = (rows[0], rows[1], rows[2])
-    sum_ = size * (1 + 4 * eps) + tiny
+    bound = size * (1 + 4 * eps) + tiny
     xy, xz, yz = -(b[0][1] + b[1][0]), -(b[0][2] + b[2][0]), -(b[1][2] + b[2][1])
     h = (
-        (sum_ + (b[1][1] + b[2][2] - b[0][0]), xy, xz),
-        (xy, sum_ + (b[0][0] + b[2][2] - b[1][1]), yz),
-        (xz, yz, sum_ + (b[0][0] + b[1][1] - b[2][2])),
+        (bound + (b[1][1] + b[2][2] - b[0][0]), xy, xz),
+        (xy, bound + (b[0][0] + b[2][2] - b[1][1]), yz),
+        (xz, yz, bound + (b[0][0] + b[1][1] - b[2][2])),
     )
     x, y, z = _definite.solve(h, _mat3.axial(b))
     # e_k ∘ (1, x, y, z), up to its sign.
