@@ -156,7 +156,8 @@ def turn_about_weakest_axis(a: Mat3, q: Quaternion) -> Quaternion:
 
 def polish(a: Mat3, q: Quaternion) -> Quaternion:
     """One Newton step; an axis whose gap is below 8 eps f moves by no more than it is determined."""
-    h, torque = _gaps_and_torque(a, q)
+    # With H formed again in every quotient the torque of matrices near −R was up to 13 times its bound in float64.
+    h, torque = computed_once(_gaps_and_torque(a, q))
     info = jnp.finfo(q[0].dtype)
     trace = jnp.abs(h[0][0] + h[1][1] + h[2][2]) * 0.5
     x, y, z = _definite.solve(_mat3.add_to_diagonal(h, 8 * float(info.eps) * trace + float(info.tiny) ** 0.5), torque)
@@ -164,14 +165,9 @@ def polish(a: Mat3, q: Quaternion) -> Quaternion:
 
 
 def _gaps_and_torque(a: Mat3, q: Quaternion) -> tuple[Mat3, Vec3]:
-    """H = tr(B)·1 − sym B and d = vee(B − Bᵀ) of B = R(q)ᵀA, q of any length but 0.
-
-    Quotients, so that every use sees the same rounding: with H formed again in each of them the torque of matrices near
-    −R was up to 13 times its bound in float64.
-    """
+    """H = tr(B)·1 − sym B and d = vee(B − Bᵀ) of B = R(q)ᵀA, times q·q: where they are used their scale cancels."""
     b = _mat3.transpose_multiply(_quaternion.to_scaled_rotation(q), a)
-    square = _quaternion.squared_norm(q)
-    return jax.tree.map(lambda entry: entry / square, (_mat3.gap_matrix(b), _mat3.axial(b)))
+    return _mat3.gap_matrix(b), _mat3.axial(b)
 
 
 def _smallest_eigenvalue(s: Mat3) -> jax.Array:
