@@ -11,7 +11,7 @@ import jaxrot
 from jaxrot.families import FAMILIES
 from jaxrot.report.accuracy import measure_errors
 from jaxrot.report.judging import judge
-from jaxrot.report.timing import SHORTEST_SAMPLE_S, compile_method, interleave
+from jaxrot.report.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
 from jaxrot.solvers import half_turn
 
 
@@ -115,6 +115,7 @@ def _time(
     functions: Mapping[str, tuple[Callable, tuple]],
     size: Size,
     shortest_sample_s: float = SHORTEST_SAMPLE_S,
+    most_rounds: int = MOST_ROUNDS,
 ) -> dict[str, np.ndarray]:
     """Seconds in every round, by name; adds the medians a matrix to the bench."""
     compiled = {name: jax.jit(function).lower(*given).compile() for name, (function, given) in functions.items()}
@@ -123,7 +124,7 @@ def _time(
         return lambda: jax.block_until_ready(compiled[name](*functions[name][1]))
 
     calls = {name: call(name) for name in functions}
-    samples, _ = interleave(calls, budget_s=size.budget_s, shortest_sample_s=shortest_sample_s)
+    samples, _ = interleave(calls, budget_s=size.budget_s, shortest_sample_s=shortest_sample_s, most_rounds=most_rounds)
     for name, seconds in samples.items():
         batch = len(functions[name][1][0])
         bench.nanoseconds[f"{name}, batch {batch:,}"] = float(np.median(seconds)) / batch * 1e9
@@ -193,9 +194,11 @@ def _small(bench: Bench, size: Size) -> None:
     exact = [name for name, method in jaxrot.METHODS.items() if method.exact]
     for batch in (1, size.small):
         a = _gaussian(batch)
-        t = _time(bench, {name: (_method(name), (a,)) for name in exact}, size)
-        fastest = np.min([seconds for name, seconds in t.items() if name != jaxrot.DEFAULT_METHOD], axis=0)
-        _add(bench, "default over the fastest exact method", batch, t[jaxrot.DEFAULT_METHOD] / fastest, 1.3)
+        # A sample is one call: among many in a row a few wait for a thread for as long as all the others take.
+        t = _time(bench, {name: (_method(name), (a,)) for name in exact}, size, shortest_sample_s=0.0, most_rounds=500)
+        fastest = min(set(exact) - {jaxrot.DEFAULT_METHOD}, key=lambda name: np.median(t[name]))
+        ratio = t[jaxrot.DEFAULT_METHOD] / t[fastest]
+        _add(bench, f"default over {fastest}, the fastest other exact method", batch, ratio, 1.3)
 
 
 def _compile_times(bench: Bench, size: Size) -> None:
