@@ -171,7 +171,6 @@ def _large(bench: Bench, size: Size) -> None:
     t = _time(bench, functions, size)
     _add(bench, "svd over default in blocks", batch, t["svd"] / t["default in blocks"], 20, at_least=True)
     _add(bench, "default in blocks over copy", batch, t["default in blocks"] / t["copy"], 4)
-    _add(bench, "default at once over copy", batch, t["default at once"] / t["copy"], 4)
     _add(bench, "newton step in blocks over copy", batch, t["newton step in blocks"] / t["copy"], 2)
     _add(bench, "quaternion_average in blocks over copy", batch, t["quaternion_average in blocks"] / t["copy"], 2)
     memory = jax.jit(functions["default in blocks"][0]).lower(a).compile().memory_analysis()
