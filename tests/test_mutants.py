@@ -42,8 +42,8 @@ MUTANTS = {
     ),
     "half a turn about the wrong axis": Mutant(
         "solvers/half_turn.py",
-        "-_smallest_eigenvalue(stretch)",
-        "_smallest_eigenvalue(stretch)",
+        "-_smallest_eigenvalue(deviator)",
+        "_smallest_eigenvalue(deviator)",
         ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[half_turn-float64-jit]",),
     ),
     "raw solver in the rule": Mutant(

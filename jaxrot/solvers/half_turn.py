@@ -138,10 +138,10 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
 def half_turn(a: Mat3, q: Quaternion, f: jax.Array) -> Quaternion:
     """Where f < 0: q, the quaternion of R(−A), after half a turn about the weakest axis of its stretch; unit length."""
     h, _ = _gaps_and_torque(a, q)
-    trace = (h[0][0] + h[1][1] + h[2][2]) * 0.5
-    sign = jnp.where(f < 0, -jnp.ones_like(f), jnp.ones_like(f))
-    stretch = _mat3.add_to_diagonal(_mat3.scale(h, -sign), sign * trace)
-    x, y, z = _definite.null_vector(_mat3.add_to_diagonal(stretch, -_smallest_eigenvalue(stretch)))
+    # The stretch is σ(tr(B)·1 − H): without their traces the two differ by the sign alone.
+    sign = jnp.where(f < 0, jnp.ones_like(f), -jnp.ones_like(f))
+    deviator = _mat3.scale(_mat3.add_to_diagonal(h, _mat3.trace(h) * (-1 / 3)), sign)
+    x, y, z = _definite.null_vector(_mat3.add_to_diagonal(deviator, -_smallest_eigenvalue(deviator)))
     turned = _quaternion.product(q, (jnp.zeros_like(x), x, y, z))
     w, x, y, z = (jnp.where(f < 0, new, old) for new, old in zip(turned, q, strict=True))
     length = jnp.sqrt(_quaternion.squared_norm((w, x, y, z)))
@@ -170,14 +170,12 @@ def _gaps_and_torque(a: Mat3, q: Quaternion) -> tuple[Mat3, Vec3]:
     return _mat3.gap_matrix(b), _mat3.axial(b)
 
 
-def _smallest_eigenvalue(s: Mat3) -> jax.Array:
-    """The smallest eigenvalue of a symmetric matrix, to 3e-9 of the spread of the three.
+def _smallest_eigenvalue(deviator: Mat3) -> jax.Array:
+    """The smallest eigenvalue of a symmetric matrix D without trace, to 3e-9 of the spread of the three.
 
-    For the deviator D it is −2p cos(⅓ arccos(−r)), p² = ‖D‖²/6, r = det D/2p³ (Smith 1961). With u = √((1−r)/2) the
-    cosine is cos(⅔ arccos u), which has no singularity on [0, 1].
+    It is −2p cos(⅓ arccos(−r)), p² = ‖D‖²/6, r = det D/2p³ (Smith 1961). With u = √((1−r)/2) the cosine is
+    cos(⅔ arccos u), which has no singularity on [0, 1].
     """
-    mean = _mat3.trace(s) / 3
-    deviator = _mat3.add_to_diagonal(s, -mean)
     square = _mat3.squared_norm(deviator) / 6
     p = jnp.sqrt(square)
     r = jnp.clip(safe_divide(_mat3.determinant(deviator), 2 * square * p), -1, 1)
@@ -185,4 +183,4 @@ def _smallest_eigenvalue(s: Mat3) -> jax.Array:
     cosine = jnp.full_like(u, _COSINE[-1])
     for coefficient in reversed(_COSINE[:-1]):
         cosine = cosine * u + coefficient
-    return computed_once(mean - 2 * p * cosine)
+    return computed_once(-2 * p * cosine)
