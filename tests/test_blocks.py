@@ -10,6 +10,8 @@ from jax import export
 
 from jaxrot import in_blocks, nearest_rotation, refine_rotation
 
+# The blocks do not depend on the method; this one compiles in a fifth of the default's time.
+nearest = functools.partial(nearest_rotation, method="gram_schmidt")
 A = np.random.default_rng(0).standard_normal((1000, 3, 3))
 # A divisor of the batch, none, one block, fewer rows than a block, one row at a time.
 SIZES = [100, 300, 1000, 4096, 1]
@@ -18,15 +20,15 @@ SIZES = [100, 300, 1000, 4096, 1]
 @pytest.mark.parametrize("size", SIZES)
 def test_blocks_give_the_same_rotations(size):
     count = 7 if size == 1 else 1000
-    expected = np.asarray(jax.jit(nearest_rotation)(A[:count]))
-    np.testing.assert_allclose(jax.jit(in_blocks(nearest_rotation, size))(A[:count]), expected, atol=1e-15)
+    expected = np.asarray(jax.jit(nearest)(A[:count]))
+    np.testing.assert_allclose(jax.jit(in_blocks(nearest, size))(A[:count]), expected, atol=1e-15)
 
 
 def test_the_blocks_are_in_the_program_and_a_divisor_of_the_batch_is_found():
-    text = jax.jit(in_blocks(nearest_rotation, 300)).lower(A).as_text()
+    text = jax.jit(in_blocks(nearest, 300)).lower(A).as_text()
     assert "stablehlo.while" in text
     assert "tensor<250x3x3xf64>" in text
-    assert "stablehlo.while" not in jax.jit(in_blocks(nearest_rotation, 1000)).lower(A).as_text()
+    assert "stablehlo.while" not in jax.jit(in_blocks(nearest, 1000)).lower(A).as_text()
 
 
 @pytest.mark.parametrize("size", [250, 300])
@@ -44,13 +46,13 @@ def test_several_arrays_and_several_results_are_split_alike(size):
 
 @pytest.mark.parametrize("size", [250, 300])
 def test_both_modes_of_differentiation_go_through(size):
-    blocked = in_blocks(nearest_rotation, size)
+    blocked = in_blocks(nearest, size)
     weights = np.random.default_rng(1).standard_normal(A.shape)
     for derivative in (
         lambda f: jax.grad(lambda a: jnp.sum(f(a) * weights))(A),
         lambda f: jax.jvp(f, (A,), (weights,))[1],
     ):
-        expected = np.asarray(derivative(nearest_rotation))
+        expected = np.asarray(derivative(nearest))
         np.testing.assert_allclose(derivative(blocked), expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
 
 
@@ -63,13 +65,13 @@ def test_the_temporary_arrays_are_those_of_a_block():
 
 
 def test_a_symbolic_batch_goes_through_at_once():
-    exported = export.export(jax.jit(in_blocks(nearest_rotation, 10)))(
+    exported = export.export(jax.jit(in_blocks(nearest, 10)))(
         jax.ShapeDtypeStruct(export.symbolic_shape("batch, 3, 3"), np.float64)
     )
-    np.testing.assert_allclose(exported.call(A), nearest_rotation(A), atol=1e-14)
+    np.testing.assert_allclose(exported.call(A), nearest(A), atol=1e-14)
 
 
 @pytest.mark.parametrize("size", [0, -1])
 def test_a_size_that_is_not_positive_is_refused(size):
     with pytest.raises(ValueError, match=f"size must be positive; got {size}"):
-        in_blocks(functools.partial(nearest_rotation), size)
+        in_blocks(nearest, size)
