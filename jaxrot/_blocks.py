@@ -15,7 +15,7 @@ def in_blocks(function: Callable[_P, _Result], size: int = 65_536) -> Callable[_
     """Applies a function of batches block by block along the first axis.
 
     A batch of millions goes through memory once for every pass of a function; in blocks the passes stay in the cache,
-    and the temporary arrays are those of one block. Made for CPUs; on an accelerator it costs and gains nothing much.
+    and the temporary arrays are those of one block. Made for CPUs.
 
     Args:
         function: From arrays with one first axis to arrays with it, each row on its own, as `nearest_rotation` with

@@ -29,7 +29,7 @@ STEPS: Mapping[str, Step] = MappingProxyType(
         "torque_exact_angle": Step(
             torque_exact_angle.correction, "linear, one step at cR", "Müller et al. 2016, eq. (4)"
         ),
-        "newton": Step(newton.correction, "cubic, from any start", "Kugelstadt et al. 2018"),
+        "newton": Step(newton.correction, "cubic, from any start", "Kugelstadt et al. 2018; Zhang 2021"),
         "cayley": Step(cayley.correction, "cubic, from within 90°", "Zhang 2021"),
         "quest": Step(quest.correction, "exact in one step, but at 180°", "Shuster and Oh 1981 (QUEST)"),
     }
