@@ -17,7 +17,7 @@ _Tree = TypeVar("_Tree")
 def computed_once(values: _Tree) -> _Tree:
     """The values themselves, one array or several, over a 1 that XLA does not see through.
 
-    That saves time too where many quotients follow: it takes a `newton` step from 103 to 65 ns a matrix.
+    That saves time too where many quotients follow: a third of a `newton` step.
     """
     number = 1 + jnp.abs(lax.stop_gradient(jax.tree.leaves(values)[0]))
     # The maximum keeps XLA from turning x/(y/y) into (x y)/y, which rounds.
@@ -28,6 +28,11 @@ def computed_once(values: _Tree) -> _Tree:
 def is_positive(x: jax.Array) -> jax.Array:
     """Whether x > 0."""
     return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
+
+
+def exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """(b, a) where the condition holds, (a, b) elsewhere."""
+    return jnp.where(condition, b, a), jnp.where(condition, a, b)
 
 
 def index_of_largest(values: tuple[jax.Array, ...]) -> jax.Array:

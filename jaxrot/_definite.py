@@ -38,7 +38,8 @@ def null_vector(h: Mat3) -> Vec3:
     solution not even orthogonal to the axis of the large one.
 
     Args:
-        h: Semidefinite to rounding, or off by one eigenvalue small beside the others. Not above 1e18 or below 1e-18.
+        h: Semidefinite to rounding, or off by one eigenvalue small beside the others. Its squares must
+            neither overflow nor underflow.
 
     Returns:
         n, finite for every finite h; the first axis for 0.

@@ -15,8 +15,8 @@ GUARDS = ("scale", "inversion", "weakest axis", "polish", "renormalisation")
 
 _NEWTON_STEPS = {"float32": 3, "float64": 4}
 
-# cos(⅔ arccos u) on [0, 1] to 3e-9 (Chebyshev interpolation). What is left tilts the axis of the half turn, and the
-# square of that times κ is what the polish has to find: it must be below √eps. With 1e-6 float64 is off by 150 bounds.
+# cos(⅔ arccos u) on [0, 1] to 3e-9 (Chebyshev interpolation). What is missing tilts the axis of the half turn, and the
+# tilt's square times κ is left to the polish: the tilt must be below √eps. With 1e-6 float64 is off by 150 bounds.
 _COSINE = (
     0.500000003,
     0.57734972,

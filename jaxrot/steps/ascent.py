@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3
-from jaxrot._choice import is_positive
+from jaxrot._choice import exchange, is_positive
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_sqrt
 
@@ -13,19 +13,24 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
     """h⁻¹ v, with the pivots of LDLᵀ replaced by their absolute values; 1/p is p/(p² + δ²), so that 1/0 is 0.
 
     With diagonal pivoting, so that an axis without a gap shows in the last pivot and not in the rounding of the others.
+
+    Args:
+        h: Symmetric, of any signature.
+        b: QᵀA, whose size decides what is rounding.
+        v: The right-hand side, the torque.
     """
     delta, torque = _resolved(b)
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     # The largest comes first. What is exchanged here is exchanged back, in reverse, at the end.
     first = is_positive(jnp.abs(h11) - jnp.abs(h00))
-    h00, h11 = _exchange(first, h00, h11)
-    h02, h12 = _exchange(first, h02, h12)
-    v0, v1 = _exchange(first, v0, v1)
+    h00, h11 = exchange(first, h00, h11)
+    h02, h12 = exchange(first, h02, h12)
+    v0, v1 = exchange(first, v0, v1)
     second = is_positive(jnp.abs(h22) - jnp.abs(h00))
-    h00, h22 = _exchange(second, h00, h22)
-    h01, h12 = _exchange(second, h01, h12)
-    v0, v2 = _exchange(second, v0, v2)
+    h00, h22 = exchange(second, h00, h22)
+    h01, h12 = exchange(second, h01, h12)
+    v0, v2 = exchange(second, v0, v2)
 
     square = delta * delta
     inverse0 = h00 / (h00 * h00 + square)
@@ -33,9 +38,9 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
     s11, s12, s22 = h11 - l1 * h01, h12 - l1 * h02, h22 - l2 * h02
     y1, y2 = v1 - l1 * v0, v2 - l2 * v0
     third = is_positive(jnp.abs(s22) - jnp.abs(s11))
-    s11, s22 = _exchange(third, s11, s22)
-    y1, y2 = _exchange(third, y1, y2)
-    h01, h02 = _exchange(third, h01, h02)
+    s11, s22 = exchange(third, s11, s22)
+    y1, y2 = exchange(third, y1, y2)
+    h01, h02 = exchange(third, h01, h02)
 
     inverse1 = s11 / (s11 * s11 + square)
     l12 = s12 * inverse1
@@ -55,9 +60,9 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
     )
     x0, x1, x2 = x0 - part * u0, x1 + part * l12, x2 - part
 
-    x1, x2 = _exchange(third, x1, x2)
-    x0, x2 = _exchange(second, x0, x2)
-    x0, x1 = _exchange(first, x0, x1)
+    x1, x2 = exchange(third, x1, x2)
+    x0, x2 = exchange(second, x0, x2)
+    x0, x1 = exchange(first, x0, x1)
     return x0, x1, x2
 
 
@@ -72,7 +77,3 @@ def _resolved(b: Mat3) -> tuple[jax.Array, jax.Array]:
     norm = jnp.where(norm == 0, jnp.ones_like(norm), norm)
     eps = float(jnp.finfo(norm.dtype).eps)
     return eps ** (2 / 3) * norm, 64 * eps * norm
-
-
-def _exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
-    return jnp.where(condition, b, a), jnp.where(condition, a, b)

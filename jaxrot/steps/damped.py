@@ -1,9 +1,8 @@
 """A damped solve for any symmetric matrix, which `cayley` and `quest` share."""
 
 import jax
-import jax.numpy as jnp
 
-from jaxrot._choice import is_positive
+from jaxrot._choice import exchange, is_positive
 from jaxrot._complex import Complex, divide, multiply, reciprocal, subtract, times
 from jaxrot._mat3 import Mat3, Vec3
 
@@ -19,19 +18,18 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
         h: Symmetric.
         delta: Positive.
         v: The right-hand side.
-
     """
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     # The largest diagonal entry comes first. What is exchanged here is exchanged back, in reverse, at the end.
     first = is_positive(h11 - h00)
-    h00, h11 = _exchange(first, h00, h11)
-    h02, h12 = _exchange(first, h02, h12)
-    v0, v1 = _exchange(first, v0, v1)
+    h00, h11 = exchange(first, h00, h11)
+    h02, h12 = exchange(first, h02, h12)
+    v0, v1 = exchange(first, v0, v1)
     second = is_positive(h22 - h00)
-    h00, h22 = _exchange(second, h00, h22)
-    h01, h12 = _exchange(second, h01, h12)
-    v0, v2 = _exchange(second, v0, v2)
+    h00, h22 = exchange(second, h00, h22)
+    h01, h12 = exchange(second, h01, h12)
+    v0, v2 = exchange(second, v0, v2)
 
     inverse0 = reciprocal((h00, delta))
     l1, l2 = times(inverse0, h01), times(inverse0, h02)
@@ -53,17 +51,13 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
     x1 = divide(subtract(y1, multiply(s12, x2)), s11)
     x0 = inverse0[0] * v0 - multiply(l1, x1)[0] - multiply(l2, x2)[0]
 
-    x1, x2 = _exchange(third, x1[0], x2[0])
-    x0, x2 = _exchange(second, x0, x2)
-    x0, x1 = _exchange(first, x0, x1)
+    x1, x2 = exchange(third, x1[0], x2[0])
+    x0, x2 = exchange(second, x0, x2)
+    x0, x1 = exchange(first, x0, x1)
     return x0, x1, x2
 
 
-def _exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
-    return jnp.where(condition, b, a), jnp.where(condition, a, b)
-
-
 def _exchange_complex(condition: jax.Array, a: Complex, b: Complex) -> tuple[Complex, Complex]:
-    real_a, real_b = _exchange(condition, a[0], b[0])
-    imaginary_a, imaginary_b = _exchange(condition, a[1], b[1])
+    real_a, real_b = exchange(condition, a[0], b[0])
+    imaginary_a, imaginary_b = exchange(condition, a[1], b[1])
     return (real_a, imaginary_a), (real_b, imaginary_b)

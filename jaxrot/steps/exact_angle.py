@@ -1,4 +1,4 @@
-"""The best angle about a given axis, which `torque_exact_angle` and `newton` share."""
+"""The best angle about a given axis, which two steps and the default method share."""
 
 import jax.numpy as jnp
 
