@@ -70,7 +70,7 @@ def test_lists_are_admitted():
 @pytest.mark.parametrize("shape", [(), (0,), (2, 0), (1,), (2, 1, 3)])
 def test_any_batch_shape_is_kept(shape):
     matrices = np.broadcast_to(A[0], (*shape, 3, 3))
-    rotation, quaternion = jax.jit(nearest_rotation)(matrices), jax.jit(nearest_quaternion_wxyz)(matrices)
+    rotation, quaternion = jax.jit(lambda a: (nearest_rotation(a), nearest_quaternion_wxyz(a)))(matrices)
     assert rotation.shape == (*shape, 3, 3)
     assert quaternion.shape == (*shape, 4)
     # XLA may contract products and sums differently for each shape.

@@ -87,7 +87,12 @@ def test_float32_is_not_computed_in_float64(function):
     assert "f64" not in jax.jit(function).lower(A).as_text()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", WITHOUT_LAPACK)
+def test_no_method_has_a_product_that_the_matmul_precision_setting_could_change(method):
+    assert "stablehlo.dot" not in jax.jit(functools.partial(nearest_rotation, method=method)).lower(A).as_text()
+
+
+@pytest.mark.parametrize("method", [DEFAULT_METHOD, *sorted(LAPACK)])
 def test_the_matmul_precision_setting_changes_nothing(method):
     function = functools.partial(nearest_rotation, method=method)
     expected = np.asarray(jax.jit(function)(A))
