@@ -6,7 +6,7 @@ from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_divide
+from jaxrot._scaling import safe_divide, safe_sqrt
 
 # notation: a plane rotation is (c, s), cosine and sine; it takes the pair (x, y) to (c x + s y, c y − s x).
 PlaneRotation = tuple[jax.Array, jax.Array]
@@ -60,7 +60,8 @@ def diagonalising(xx: jax.Array, xy: jax.Array, yy: jax.Array) -> tuple[PlaneRot
     """
     difference = xx - yy
     double = 2 * xy
-    root = jnp.sqrt(difference * difference + double * double)
+    # Where the matrix is a multiple of 1 the root has no derivative; 0 stands for it, not NaN.
+    root = safe_sqrt(difference * difference + double * double)
     t = safe_divide(jnp.where(difference < 0, -double, double), jnp.abs(difference) + root)
     c = 1 / jnp.sqrt(t * t + 1)
     return (c, t * c), t
@@ -131,13 +132,9 @@ def ordered_svd(left: Mat3, diagonal: Vec3, right: Mat3) -> tuple[Mat3, Vec3, Ma
         for axes in (u, v):
             # Exchanged by a quarter turn, so that the determinant stays +1.
             opposite = _mat3.scale_vector(axes[i], -1.0)
-            axes[i], axes[j] = _where(is_smaller, axes[j], axes[i]), _where(is_smaller, opposite, axes[j])
+            axes[i], axes[j] = _mat3.where(is_smaller, axes[j], axes[i]), _mat3.where(is_smaller, opposite, axes[j])
     for i in (0, 1):
         sign = jnp.where(d[i] < 0, -jnp.ones_like(d[i]), jnp.ones_like(d[i]))
         d[i], d[2] = d[i] * sign, d[2] * sign
         u[i], u[2] = _mat3.scale_vector(u[i], sign), _mat3.scale_vector(u[2], sign)
     return _mat3.transpose((u[0], u[1], u[2])), (d[0], d[1], d[2]), _mat3.transpose((v[0], v[1], v[2]))
-
-
-def _where(condition: jax.Array, u: Vec3, v: Vec3) -> Vec3:
-    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), u, v)

@@ -4,12 +4,15 @@ Written out on components, XLA fuses the whole algorithm into few passes over me
 do not fuse, and an accelerator may compute them in TF32 or bfloat16.
 """
 
+from typing import TypeVar
+
 import jax
 import jax.numpy as jnp
 
 # notation: a matrix is a tuple of rows, each a tuple of three arrays of one batch shape; a vector is such a row.
 Vec3 = tuple[jax.Array, jax.Array, jax.Array]
 Mat3 = tuple[Vec3, Vec3, Vec3]
+_Tree = TypeVar("_Tree", Vec3, Mat3)
 
 
 def components(matrix: jax.Array) -> Mat3:
@@ -25,7 +28,7 @@ def stack(m: Mat3) -> jax.Array:
 
 def scale(m: Mat3, factor: jax.Array | float) -> Mat3:
     """The matrix times a number."""
-    return _map(lambda x: x * factor, m)
+    return jax.tree.map(lambda x: x * factor, m)
 
 
 def add(a: Mat3, b: Mat3) -> Mat3:
@@ -41,6 +44,11 @@ def add_vectors(u: Vec3, v: Vec3) -> Vec3:
 def scale_vector(v: Vec3, factor: jax.Array | float) -> Vec3:
     """The vector times a number."""
     return (v[0] * factor, v[1] * factor, v[2] * factor)
+
+
+def multiply_entries(u: Vec3, v: Vec3) -> Vec3:
+    """The products of the entries of two vectors, a diagonal matrix times a vector."""
+    return (u[0] * v[0], u[1] * v[1], u[2] * v[2])
 
 
 def add_to_diagonal(m: Mat3, number: jax.Array) -> Mat3:
@@ -101,6 +109,11 @@ def squared_norm(m: Mat3) -> jax.Array:
     return dot(m[0], m[0]) + dot(m[1], m[1]) + dot(m[2], m[2])
 
 
+def symmetric(m: Mat3) -> Mat3:
+    """The symmetric part (m + mᵀ)/2."""
+    return scale(add(m, transpose(m)), 0.5)
+
+
 def axial(m: Mat3) -> Vec3:
     """The vector d = vee(m − mᵀ) = (m32−m23, m13−m31, m21−m12)."""
     return (m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1])
@@ -147,9 +160,9 @@ def newton_schulz(r: Mat3) -> Mat3:
     return add(r, scale(multiply(r, defect), -0.5))
 
 
-def where(condition: jax.Array, a: Mat3, b: Mat3) -> Mat3:
-    """Chooses whole matrices by a batch-shaped condition."""
-    return _map(lambda x, y: jnp.where(condition, x, y), a, b)
+def where(condition: jax.Array, a: _Tree, b: _Tree) -> _Tree:
+    """Chooses whole matrices, or vectors, by a batch-shaped condition."""
+    return jax.tree.map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
 def identity_like(m: Mat3) -> Mat3:
@@ -157,7 +170,3 @@ def identity_like(m: Mat3) -> Mat3:
     zero = jnp.zeros_like(m[0][0])
     one = jnp.ones_like(m[0][0])
     return ((one, zero, zero), (zero, one, zero), (zero, zero, one))
-
-
-def _map(function, *matrices: Mat3) -> Mat3:
-    return jax.tree.map(function, *matrices)

@@ -10,15 +10,17 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
     {"_blocks", "_choice", "_complex", "_inputs", "_mat3", "_quaternion", "_scaling", "families"},
-    {"_derivative", "_definite", "_jacobi"},
+    {"_definite", "_jacobi", "_saturation", "_symmetric"},
+    {"_derivative"},
     {"steps"},
     {"solvers"},
-    {"_nearest", "_refine"},
+    {"_nearest", "_refine", "_svd"},
+    {"_conditioning", "_dense", "_polar"},
     {"__init__"},
     {"report"},
     {"__main__"},
 ]
-CORE = {name for layer in LAYERS[:6] for name in layer}
+CORE = {name for layer in LAYERS[:8] for name in layer}
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
