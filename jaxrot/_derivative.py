@@ -17,7 +17,7 @@ from jax import lax
 from jaxrot import _mat3
 from jaxrot._complex import add, multiply, reciprocal, square, subtract, times
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import power_of_two_factor
+from jaxrot._saturation import factor_of, gain, scaled_response
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
@@ -43,21 +43,41 @@ def angular_tangent(
         matrix_dot: Ȧ, same shape and dtype.
         damping: δ/tr S where that is more than the 64 eps that are always there.
         order: How many derivatives have been taken before this one. It only decides where saturation begins, see
-            `_gain`.
+            `_saturation.gain`.
 
     Returns:
         ω on components. Finite for every finite A, and its derivatives too.
     """
-    r = _mat3.components(rotation)
-    stretch = _mat3.transpose_multiply(r, _mat3.components(_normalised(matrix, rotation, order + 1)))
-    factor = _factor(matrix)
-    # The factor is applied in two halves, before and after: at once it could overflow or underflow on one side. Both
-    # are divisions, because XLA:CPU stores quotients and forms products again in each entry of the result; the
-    # transpose, the reverse mode, has them in the other order. With products it took 1.7 times as long.
-    first_half = power_of_two_factor(lax.rsqrt(jnp.where(factor > 0, factor, jnp.ones_like(factor))))
-    inverse, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(stretch, damping))
-    torque = _divided(_mat3.axial(_mat3.transpose_multiply(r, _mat3.components(matrix_dot))), 1 / first_half)
-    return _divided(_mat3.apply(inverse, torque), first_half / _gain(factor, norm, order))
+    torque = _mat3.axial(_mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot)))
+    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, order)
+    return scaled_response(functools.partial(_mat3.apply, inverse), torque, factor_of(matrix), norm, order)
+
+
+def stretch_tangent(matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, order: int = 0) -> jax.Array:
+    """The tangent Ṡ = RᵀȦ − [ω]× S of the stretch S = RᵀA; arguments and shapes as for `rotation_tangent`.
+
+    It does not depend on the scale of A, so that it is right at every scale: ω and S are those of the normalised A.
+    """
+    along = _mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot))
+    inverse, _, stretch = _inverse_gaps(matrix, rotation, 0.0, order)
+    omega = _mat3.apply(inverse, _mat3.axial(along))
+    turn = _mat3.multiply(_mat3.skew(omega), stretch)
+    return _mat3.stack(_mat3.symmetric(_mat3.add(along, _mat3.scale(turn, -1.0))))
+
+
+def inverse_gap_matrix(matrix: jax.Array, rotation: jax.Array, *, damping: float = 0.0, order: int = 0) -> Mat3:
+    """H⁻¹ on components, damped and saturated as in `angular_tangent`, whose arguments it takes."""
+    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, order)
+    return _mat3.scale(inverse, gain(factor_of(matrix), norm, order))
+
+
+def _inverse_gaps(matrix: jax.Array, rotation: jax.Array, damping: float, order: int) -> tuple[Mat3, jax.Array, Mat3]:
+    """The damped inverse of H of the normalised A, its norm, and the stretch of the normalised A."""
+    stretch = _mat3.transpose_multiply(
+        _mat3.components(rotation), _mat3.components(_normalised(matrix, rotation, order + 1))
+    )
+    inverse, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping))
+    return inverse, norm, stretch
 
 
 def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
@@ -94,26 +114,20 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
     return inverse, jnp.sqrt(largest)
 
 
-def resolved_gap(stretch: Mat3, damping: float = 0.0) -> jax.Array:
-    """δ: the gap below which an axis is damped, 64 eps·tr S or more; tr S lies between s1 and 3 s1.
+def resolved_gap(total: jax.Array, damping: float = 0.0) -> jax.Array:
+    """δ: the gap below which an axis is damped, 64 eps·tr S or more; `total`, tr S, lies between s1 and 3 s1.
 
     Where A = 0 it is 1, so that the rule reads 0/1 there and not 0/0.
     """
-    total = jnp.abs(_mat3.trace(stretch))
+    total = jnp.abs(total)
     delta = max(_RESOLVED * float(jnp.finfo(total.dtype).eps), damping) * total
     return jnp.where(total == 0, jnp.ones_like(total), delta)
-
-
-def _factor(matrix: jax.Array) -> jax.Array:
-    """The power of two that normalises A; 0 where A = 0, which makes every derivative there 0."""
-    magnitude = _mat3.largest_entry(_mat3.components(lax.stop_gradient(matrix)))
-    return jnp.where(magnitude == 0, jnp.zeros_like(magnitude), power_of_two_factor(magnitude))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
 def _normalised(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
     """A times its power of two; the derivative saturates with the order at which it is taken."""
-    return matrix * _factor(matrix)[..., None, None]
+    return matrix * factor_of(matrix)[..., None, None]
 
 
 @_normalised.defjvp
@@ -123,25 +137,5 @@ def _normalised_jvp(order: int, primals, tangents):
     stretch = _mat3.transpose_multiply(
         _mat3.components(lax.stop_gradient(rotation)), _mat3.components(lax.stop_gradient(value))
     )
-    _, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(stretch))
-    return value, matrix_dot * _gain(_factor(matrix), norm, order)[..., None, None]
-
-
-def _gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
-    """The factor, saturated so that the derivatives up to this order stay finite where they would overflow.
-
-    The n-th derivative grows like gⁿ, g = factor·‖(H+iδ)⁻¹‖: at |A| = 1e-20 the second one is 1e40. Beyond what the
-    dtype holds the product of the factors is held constant, with a margin of 2¹⁰ an order for the number of terms.
-    """
-    norm = lax.stop_gradient(norm)
-    largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 3)
-    limit = largest * 2.0 ** (-10 * order)
-    growth = factor * norm
-    lower_orders = 1.0 if order == 0 else jnp.minimum(growth**order, largest * 2.0 ** (-10 * (order - 1)))
-    return jnp.where(growth <= limit ** (1 / (order + 1)), factor, limit / lower_orders / norm)
-
-
-def _divided(v: Vec3, divisor: jax.Array) -> Vec3:
-    # The maximum keeps XLA from turning x/(y/z) into (x z)/y, which overflows.
-    divisor = jnp.maximum(divisor, float(jnp.finfo(divisor.dtype).tiny))
-    return (v[0] / divisor, v[1] / divisor, v[2] / divisor)
+    _, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch)))
+    return value, matrix_dot * gain(factor_of(matrix), norm, order)[..., None, None]
