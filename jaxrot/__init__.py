@@ -2,10 +2,20 @@
 
 from jaxrot import families as families
 from jaxrot._blocks import in_blocks as in_blocks
+from jaxrot._conditioning import rotation_gap as rotation_gap
+from jaxrot._dense import TwistModes as TwistModes
+from jaxrot._dense import arap_hessian as arap_hessian
+from jaxrot._dense import rotation_jacobian as rotation_jacobian
+from jaxrot._dense import twist_modes as twist_modes
 from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
+from jaxrot._polar import PolarDecomposition as PolarDecomposition
+from jaxrot._polar import polar_decomposition as polar_decomposition
 from jaxrot._refine import refine_quaternion_wxyz as refine_quaternion_wxyz
 from jaxrot._refine import refine_rotation as refine_rotation
+from jaxrot._svd import RotationVariantSVD as RotationVariantSVD
+from jaxrot._svd import rotation_variant_svd as rotation_variant_svd
+from jaxrot._svd import signed_singular_values as signed_singular_values
 from jaxrot.solvers import DEFAULT_METHOD as DEFAULT_METHOD
 from jaxrot.solvers import METHODS as METHODS
 from jaxrot.solvers import Method as Method
@@ -19,11 +29,21 @@ __all__ = [
     "METHODS",
     "STEPS",
     "Method",
+    "PolarDecomposition",
+    "RotationVariantSVD",
     "Step",
+    "TwistModes",
+    "arap_hessian",
     "families",
     "in_blocks",
     "nearest_quaternion_wxyz",
     "nearest_rotation",
+    "polar_decomposition",
     "refine_quaternion_wxyz",
     "refine_rotation",
+    "rotation_gap",
+    "rotation_jacobian",
+    "rotation_variant_svd",
+    "signed_singular_values",
+    "twist_modes",
 ]

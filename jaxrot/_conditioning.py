@@ -1,0 +1,56 @@
+"""How well a matrix determines its nearest rotation."""
+
+import functools
+
+import jax
+from jax.typing import ArrayLike
+
+from jaxrot._inputs import check_matrix
+from jaxrot._saturation import factor_of, gain
+from jaxrot._scaling import safe_divide
+from jaxrot._svd import decomposed, inverse_gaps, singular_value_tangents
+
+
+def rotation_gap(matrix: ArrayLike) -> jax.Array:
+    """The relative gap (s2+s3)/s1 of the nearest rotation: 0 where that is not unique, 2 for a multiple of a rotation.
+
+    It is 1/κ, κ the condition number of R: a relative error ε in A turns R by about ε/gap.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+
+    Returns:
+        The gap in [0, 2], shape (...), dtype of `matrix`, to 32 eps. 0 for A = 0; NaN for a matrix with NaN or inf.
+
+    Raises:
+        ValueError: Wrong shape.
+        TypeError: Complex or non-numeric matrix.
+
+    Uniqueness:
+        Unique. Below some 32 eps the gap is rounding, and R one of several nearest rotations.
+
+    Derivative:
+        Forward and reverse, to any order, finite for every finite matrix, 0 at A = 0; as for `signed_singular_values`.
+
+    Source: Higham, "Functions of matrices", 2008, theorem 8.9 (the condition of the unitary polar factor of a real
+    matrix is 2/(σ₂+σ₃)), with signed singular values.
+    """
+    checked = check_matrix(matrix)
+    return _gap(checked.value, 0).astype(checked.dtype)
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
+def _gap(matrix: jax.Array, order: int) -> jax.Array:
+    """The gap; `order` counts the derivatives taken, see `_saturation.gain`."""
+    _, _, s, _ = decomposed(matrix, order)
+    return safe_divide(s[..., 1] + s[..., 2], s[..., 0])
+
+
+@_gap.defjvp
+def _gap_jvp(order: int, primals, tangents):
+    (matrix,), (matrix_dot,) = primals, tangents
+    gap = _gap(matrix, order + 1)
+    left, _, s, right = decomposed(matrix, order + 1)
+    s1_dot, s2_dot, s3_dot = singular_value_tangents(left, matrix_dot, right)
+    _, _, norm = inverse_gaps(s)
+    return gap, safe_divide(s2_dot + s3_dot - gap * s1_dot, s[..., 0]) * gain(factor_of(matrix), norm, order)

@@ -1,0 +1,156 @@
+"""Dense 9×9 matrices for Newton solvers: the Jacobian of the nearest rotation and the Hessian of ‖A − R‖²."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from jaxrot import _mat3
+from jaxrot._derivative import inverse_gap_matrix
+from jaxrot._inputs import check_damping, check_flag, check_matrix
+from jaxrot._mat3 import Mat3
+from jaxrot._nearest import nearest_rotation
+from jaxrot._saturation import factor_of, gain
+from jaxrot._svd import decomposed, inverse_gaps
+from jaxrot.solvers import DEFAULT_METHOD
+
+
+class TwistModes(NamedTuple):
+    """The eigenvectors of the Jacobian of R whose eigenvalue is not 0.
+
+    Attributes:
+        eigenvalues: 2/(s2+s3), 2/(s1+s3), 2/(s1+s2), shape (..., 3), the largest first.
+        modes: U [eᵢ]× Vᵀ/√2, shape (..., 3, 3, 3), the first of these axes counts them; orthonormal.
+    """
+
+    eigenvalues: jax.Array
+    modes: jax.Array
+
+
+def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
+    """The Jacobian of the nearest rotation as a 9×9 matrix, in closed form.
+
+    J = ∂vec(R)/∂vec(A), vec row by row: vec(Ṙ) = J vec(Ȧ). J = T H⁻¹ Tᵀ with H = tr(S)·1 − S, S = RᵀA, and the rows
+    e_n × r_m of T, r_m those of R: symmetric and positive semidefinite, of rank 3.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+        method: A name in `METHODS`, for R. Static.
+        damping: Relative damping of H⁻¹, as for `nearest_rotation`. Static.
+
+    Returns:
+        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit; exactly symmetric. Accuracy, and what happens
+        where R is not unique, as for the derivative of `nearest_rotation`, which it is.
+
+    Raises:
+        ValueError: Wrong shape, unknown method, negative damping.
+        TypeError: Complex or non-numeric matrix, traced method or damping.
+
+    Uniqueness:
+        As for `nearest_rotation`.
+
+    Derivative:
+        The second derivative of R.
+
+    Source: Kim and Eberle, "Dynamic deformables", 2020 (the rotation gradient), with H instead of singular vectors.
+    """
+    checked = check_matrix(matrix)
+    a, damping = checked.value, check_damping(damping)
+    rotation = nearest_rotation(a, method=method)
+    inverse = inverse_gap_matrix(a, rotation, damping=damping)
+    return _quadratic_form(_mat3.components(rotation), inverse).astype(checked.dtype)
+
+
+def twist_modes(matrix: ArrayLike) -> TwistModes:
+    """The three directions of A in which R turns, and how fast: the eigenpairs of `rotation_jacobian`.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+
+    Returns:
+        (eigenvalues, modes). The eigenvalues are 2/(sᵢ+sⱼ), in one over the unit of A; one whose sᵢ+sⱼ is below about
+        64 eps tr S is damped to 0. A matrix with NaN or inf gives NaN.
+
+    Raises:
+        ValueError: Wrong shape.
+        TypeError: Complex or non-numeric matrix.
+
+    Uniqueness:
+        The modes of equal singular values are one basis of the many.
+
+    Derivative:
+        Finite; that of `rotation_variant_svd`.
+
+    Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
+    """
+    checked = check_matrix(matrix)
+    left, _, normalised, right = decomposed(checked.value, 0)
+    u, v = _mat3.components(left), _mat3.components(right)
+    over_sums, _, norm = inverse_gaps(normalised)
+    eigenvalues = 2 * jnp.stack(over_sums, axis=-1) * gain(factor_of(checked.value), norm, 0)[..., None]
+    axes = _mat3.identity_like(u)
+    modes = [_mat3.multiply(u, _mat3.multiply(_mat3.skew(axis), _mat3.transpose(v))) for axis in axes]
+    stacked = jnp.stack([_mat3.stack(_mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)
+    return TwistModes(eigenvalues.astype(checked.dtype), stacked.astype(checked.dtype))
+
+
+def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
+    """The Hessian of the as-rigid-as-possible energy ‖A − R(A)‖² as a 9×9 matrix, projected or not.
+
+    The gradient is 2(A − R), the Hessian 2(1 − J). Its eigenvalues are 2, six times, and 2 − 4/(sᵢ+sⱼ): negative where
+    A is compressed so far that sᵢ+sⱼ < 2, and there Newton's method on it may climb.
+
+    Args:
+        matrix: A, the deformation gradient, real, shape (..., 3, 3), near the scale of a rotation.
+        psd: Replace the negative eigenvalues by 0: the nearest positive semidefinite matrix. Static.
+
+    Returns:
+        The Hessian, shape (..., 9, 9), dtype of `matrix`, vec row by row; exactly symmetric.
+
+    Raises:
+        ValueError: Wrong shape.
+        TypeError: Complex or non-numeric matrix; `psd` is no static bool.
+
+    Uniqueness:
+        Where R is not unique the energy has a kink, and this is the Hessian beside it: projected, the eigenvalue about
+        the free axis is 0; not projected, it is 2, because J is damped there.
+
+    Derivative:
+        Finite.
+
+    Source: Smith, de Goes and Kim 2019; Lin et al., "Isotropic ARAP energy using Cauchy–Green invariants", 2022.
+    """
+    checked = check_matrix(matrix)
+    if check_flag(psd, "psd"):
+        rotation, inverse = _clamped(checked.value)
+    else:
+        r = nearest_rotation(checked.value)
+        rotation, inverse = _mat3.components(r), inverse_gap_matrix(checked.value, r)
+    jacobian = _quadratic_form(rotation, inverse)
+    return (2 * (jnp.eye(9, dtype=jacobian.dtype) - jacobian)).astype(checked.dtype)
+
+
+def _clamped(matrix: jax.Array) -> tuple[Mat3, Mat3]:
+    """R, and H⁻¹ with its eigenvalues 1/(sᵢ+sⱼ) held below ½, where those of 2(1 − J) would become negative.
+
+    Clamped, nothing is large: there is no gap to resolve.
+    """
+    left, s, _, right = decomposed(matrix, 0)
+    v = _mat3.components(right)
+    s1, s2, s3 = s[..., 0], s[..., 1], s[..., 2]
+    x, y, z = (1 / jnp.maximum(gap, 2) for gap in (s2 + s3, s3 + s1, s1 + s2))
+    weighted = [_mat3.multiply_entries(row, (x, y, z)) for row in v]
+    inverse = _mat3.multiply((weighted[0], weighted[1], weighted[2]), _mat3.transpose(v))
+    rotation = _mat3.multiply(_mat3.components(left), _mat3.transpose(v))
+    return rotation, _mat3.symmetric(inverse)
+
+
+def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
+    """T M Tᵀ for a symmetric M, shape (..., 9, 9): its 3×3 blocks are [r_i]× M [r_k]×ᵀ, r the rows of R."""
+    turns = [_mat3.skew(row) for row in rotation]
+    blocks = [[_mat3.multiply(_mat3.multiply(x, m), _mat3.transpose(y)) for y in turns] for x in turns]
+    rows = [[entry for block in row for entry in block[i]] for row in blocks for i in range(3)]
+    # Off the diagonal either entry would do; taking one of the two makes the matrix symmetric to the last digit.
+    entries = [rows[min(i, k)][max(i, k)] for i in range(9) for k in range(9)]
+    return jnp.stack(entries, axis=-1).reshape(*entries[0].shape, 9, 9)

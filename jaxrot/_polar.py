@@ -1,0 +1,76 @@
+"""The polar decomposition: the nearest rotation and the stretch."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+from jax.typing import ArrayLike
+
+from jaxrot import _mat3
+from jaxrot._derivative import stretch_tangent
+from jaxrot._inputs import check_matrix
+from jaxrot._nearest import nearest_rotation
+from jaxrot._scaling import power_of_two, scaled
+from jaxrot.solvers import DEFAULT_METHOD
+
+
+class PolarDecomposition(NamedTuple):
+    """A = R S.
+
+    Attributes:
+        rotation: R, shape (..., 3, 3), det R = +1.
+        stretch: S, shape (..., 3, 3), symmetric; with the eigenvalues s1, s2, s3.
+    """
+
+    rotation: jax.Array
+    stretch: jax.Array
+
+
+def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> PolarDecomposition:
+    """The rotation R and the symmetric stretch S with A = R S.
+
+    R = argmax tr(RᵀA) over the rotations, S = RᵀA. Unlike that of textbooks R is a rotation for det A < 0 too; S then
+    has one negative eigenvalue, the smallest in modulus.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
+            default floating dtype.
+        method: A name in `METHODS`, for R. Static.
+
+    Returns:
+        R as from `nearest_rotation`, and S in the unit of A, exactly symmetric; by the default method A = R S to 32 eps
+        s1. A matrix with NaN or inf gives NaN.
+
+    Raises:
+        ValueError: Wrong shape, unknown method.
+        TypeError: Complex or non-numeric matrix, traced method.
+
+    Uniqueness:
+        R is unique iff s2+s3 > 0, and so is S. The eigenvalues of S are always unique. Where s3 ≥ 0 S is the square
+        root of AᵀA, unique whatever R is.
+
+    Derivative:
+        That of the nearest rotation for R, Ṡ = RᵀȦ − [ω]× S for S, to any order. Exact at equal singular values; along
+        an axis of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. At every scale Ṡ is of the size of Ȧ.
+
+    Source: Higham 1986; for R see `nearest_rotation`.
+    """
+    checked = check_matrix(matrix)
+    rotation = nearest_rotation(checked.value, method=method)
+    stretch = _stretch(checked.value, rotation, 0)
+    return PolarDecomposition(rotation.astype(checked.dtype), stretch.astype(checked.dtype))
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
+def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
+    """S = RᵀA, a function of A alone: R's tangent is part of the rule. `order`: see `stretch_tangent`."""
+    m = _mat3.components(matrix)
+    # Scaled, a sum of three products does not overflow where S does not.
+    product = _mat3.transpose_multiply(_mat3.components(rotation), scaled(m))
+    return _mat3.stack(_mat3.scale(_mat3.symmetric(product), power_of_two(m)))
+
+
+@_stretch.defjvp
+def _stretch_jvp(order: int, primals, tangents):
+    (matrix, rotation), (matrix_dot, _) = primals, tangents
+    return _stretch(matrix, rotation, order + 1), stretch_tangent(matrix, rotation, matrix_dot, order=order)

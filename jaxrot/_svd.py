@@ -1,0 +1,163 @@
+"""The singular value decomposition whose factors are rotations and whose last singular value carries the sign."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from jaxrot import _mat3
+from jaxrot._derivative import resolved_gap
+from jaxrot._inputs import check_matrix
+from jaxrot._mat3 import Mat3, Vec3
+from jaxrot._saturation import factor_of, gain, scaled_response
+from jaxrot._scaling import power_of_two, scaled
+from jaxrot._symmetric import eigen
+from jaxrot.solvers import DEFAULT_METHOD, METHODS
+
+
+class RotationVariantSVD(NamedTuple):
+    """A = left · diag(singular_values) · rightᵀ.
+
+    Attributes:
+        left: U, shape (..., 3, 3), det U = +1.
+        singular_values: (s1, s2, s3), shape (..., 3), s1 ≥ s2 ≥ |s3|, in the unit of A; s3 has the sign of det A.
+        right: V, shape (..., 3, 3), det V = +1.
+    """
+
+    left: jax.Array
+    singular_values: jax.Array
+    right: jax.Array
+
+
+def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
+    """The singular value decomposition A = U diag(s1, s2, s3) Vᵀ with rotations U and V.
+
+    U Vᵀ is the nearest rotation, V diag(s) Vᵀ the stretch. The sign of det A is in s3 and never in U or V, so that
+    nothing flips where a finite element is pressed through a plane.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
+            default floating dtype.
+
+    Returns:
+        (left, singular_values, right). With eps of the computing dtype: U and V orthogonal to 10 eps, A =
+        U diag(s) Vᵀ to 32 eps s1, s to 16 eps s1. A matrix with NaN or inf gives NaN.
+
+    Raises:
+        ValueError: Wrong shape.
+        TypeError: Complex or non-numeric matrix.
+
+    Uniqueness:
+        s is unique. U and V are unique up to the signs of two columns where the singular values differ; where two are
+        equal, or s2 = −s3, a plane of them may turn. They are always the same for the same matrix.
+
+    Derivative:
+        Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
+        equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
+        one of these is below about 64 eps tr S its part is damped to 0. For functions of the nearest rotation or of
+        the stretch use `nearest_rotation` and `polar_decomposition`, which have no difference in a denominator.
+
+    Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
+    the eigenvectors of the stretch, by `_symmetric.eigen`.
+    """
+    checked = check_matrix(matrix)
+    left, singular_values, _, right = decomposed(checked.value, 0)
+    return RotationVariantSVD(
+        left.astype(checked.dtype), singular_values.astype(checked.dtype), right.astype(checked.dtype)
+    )
+
+
+def signed_singular_values(matrix: ArrayLike) -> jax.Array:
+    """The singular values s1 ≥ s2 ≥ |s3| with the sign of det A in s3; those of `rotation_variant_svd` alone.
+
+    Under `jit` the program holds neither U nor V, only what their derivative needs where it is taken.
+
+    Args:
+        matrix: A, real, shape (..., 3, 3), any scale.
+
+    Returns:
+        s, shape (..., 3), dtype and unit of `matrix`, to 16 eps s1. A matrix with NaN or inf gives NaN.
+
+    Raises:
+        ValueError: Wrong shape.
+        TypeError: Complex or non-numeric matrix.
+
+    Uniqueness:
+        Unique.
+
+    Derivative:
+        ṡᵢ = uᵢᵀ Ȧ vᵢ, see `rotation_variant_svd`.
+
+    Source: as for `rotation_variant_svd`.
+    """
+    checked = check_matrix(matrix)
+    return decomposed(checked.value, 0)[1].astype(checked.dtype)
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
+def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """U, s, s of the normalised A, and V; `order` counts the derivatives taken, see `_saturation.gain`.
+
+    The normalised ones are what derivatives divide by. Their own derivative is saturated, that of s is not.
+    """
+    m = _mat3.components(matrix)
+    a = scaled(m)
+    rotation = _mat3.components(METHODS[DEFAULT_METHOD].solve(matrix))
+    values, axes = eigen(_mat3.symmetric(_mat3.transpose_multiply(rotation, a)))
+    right = _mat3.newton_schulz(_mat3.transpose(axes))
+    left = _mat3.newton_schulz(_mat3.multiply(rotation, right))
+    # Rounding may have left the order broken: s2 by a few eps below |s3|, or negative.
+    s2 = jnp.maximum(values[1], jnp.abs(values[2]))
+    s = jnp.stack((jnp.maximum(values[0], s2), s2, values[2]), axis=-1)
+    # notation: the scaled A is in [1, 2), the normalised one, which derivatives use, in [2, 4), and 0 for 0.
+    return _mat3.stack(left), s * power_of_two(m)[..., None], s * 2, _mat3.stack(right)
+
+
+@decomposed.defjvp
+def _decomposed_jvp(order: int, primals, tangents):
+    (matrix,), (matrix_dot,) = primals, tangents
+    left, s, normalised, right = decomposed(matrix, order + 1)
+    m = _tangent_in_their_axes(left, matrix_dot, right)
+    s_dot = jnp.stack((m[0][0], m[1][1], m[2][2]), axis=-1)
+
+    # notation: U̇ = U [p+w]×/2, V̇ = V [p−w]×/2: w is the angular velocity of U Vᵀ, in the axes V.
+    over_sums, over_differences, norm = inverse_gaps(normalised)
+    factor = factor_of(matrix)
+    mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])
+    w = scaled_response(functools.partial(_mat3.multiply_entries, over_sums), _mat3.axial(m), factor, norm, order)
+    p = scaled_response(functools.partial(_mat3.multiply_entries, over_differences), mirrored, factor, norm, order)
+    left_dot = _turned(left, _mat3.scale_vector(_mat3.add_vectors(p, w), 0.5))
+    right_dot = _turned(right, _mat3.scale_vector(_mat3.add_vectors(p, _mat3.scale_vector(w, -1.0)), 0.5))
+    normalised_dot = s_dot * gain(factor, norm, order + 1)[..., None]
+    return (left, s, normalised, right), (left_dot, s_dot, normalised_dot, right_dot)
+
+
+def singular_value_tangents(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Vec3:
+    """ṡᵢ = uᵢᵀ Ȧ vᵢ."""
+    m = _tangent_in_their_axes(left, matrix_dot, right)
+    return m[0][0], m[1][1], m[2][2]
+
+
+def _tangent_in_their_axes(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Mat3:
+    product = _mat3.multiply(_mat3.components(matrix_dot), _mat3.components(right))
+    return _mat3.transpose_multiply(_mat3.components(left), product)
+
+
+def inverse_gaps(normalised: jax.Array) -> tuple[Vec3, Vec3, jax.Array]:
+    """One over (s2+s3, s3+s1, s1+s2) and one over (s2−s3, s3−s1, s1−s2), damped, and the largest modulus of the six.
+
+    Args:
+        normalised: The singular values of the normalised A, shape (..., 3).
+    """
+    s0, s1, s2 = normalised[..., 0], normalised[..., 1], normalised[..., 2]
+    delta = resolved_gap(s0 + s1 + s2)
+    square = delta * delta
+    a, b, c = (gap / (gap * gap + square) for gap in (s1 + s2, s2 + s0, s0 + s1))
+    d, e, f = (gap / (gap * gap + square) for gap in (s1 - s2, s2 - s0, s0 - s1))
+    return (a, b, c), (d, e, f), functools.reduce(jnp.maximum, (jnp.abs(x) for x in (a, b, c, d, e, f)))
+
+
+def _turned(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
+    return _mat3.stack(_mat3.multiply(_mat3.components(axes), _mat3.skew(angular_velocity)))
