@@ -13,9 +13,18 @@ from jaxrot.steps import STEPS
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
 
+# What `derivative` may be, and what is then differentiated.
+_DERIVATIVES = {"implicit": "the nearest rotation, by its rule", "unrolled": "the iterations that are run"}
+
 
 def refine_rotation(
-    matrix: ArrayLike, rotation: ArrayLike, *, step: str = "torque", iterations: int = 3, escape: bool = False
+    matrix: ArrayLike,
+    rotation: ArrayLike,
+    *,
+    step: str = "torque",
+    iterations: int = 3,
+    escape: bool = False,
+    derivative: str = "implicit",
 ) -> jax.Array:
     """Moves a rotation towards the one nearest to a 3×3 matrix, by a fixed number of steps.
 
@@ -30,6 +39,7 @@ def refine_rotation(
         iterations: How many steps, ≥ 0. Static.
         escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
             about one step more, and nothing when it is off.
+        derivative: `"implicit"` or `"unrolled"`, see below. Static.
 
     Returns:
         A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`.
@@ -47,8 +57,8 @@ def refine_rotation(
         κ < 1e3. `quest`: none for κ < 10, 0.3 % in float32 and none in float64 for κ < 1e3. The linear steps need tens.
 
     Raises:
-        ValueError: Wrong shape, unknown step, negative iterations.
-        TypeError: Complex or non-numeric arrays, traced step, iterations or escape.
+        ValueError: Wrong shape, unknown step or derivative, negative iterations.
+        TypeError: Complex or non-numeric arrays, traced step, iterations, escape or derivative.
 
     Uniqueness:
         From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) every step stands
@@ -56,8 +66,15 @@ def refine_rotation(
         `quest` to √eps).
 
     Derivative:
-        The implicit rule of `nearest_rotation`, at the rotation that was reached: right at convergence, and zero with
-        respect to the start, on which the limit does not depend.
+        `"implicit"`: the rule of `nearest_rotation`, at the rotation that was reached, and zero with respect to the
+        start, on which the limit does not depend. It is right at convergence, costs one small solve whatever the number
+        of iterations, and has any order. Where the iteration stops early it is not the derivative of the result.
+
+        `"unrolled"`: the derivative of what was computed, with respect to the matrix and to the start, in forward and
+        reverse mode. It is right wherever the iteration stops, for a simulation that is itself differentiated through
+        its warm starts for example; memory and time in reverse mode grow with the iterations. At convergence both
+        agree, as fast as the step converges. The start counts as the quaternion of its largest column: a change of a
+        matrix that leaves the rotations has a derivative too, and no meaning.
 
     Source: `STEPS[step].source`; for `torque` with the errata stated in `steps/torque.py`.
     """
@@ -66,7 +83,7 @@ def refine_rotation(
     # Neither its length nor its sign matters.
     columns = _quaternion.davenport_columns(_mat3.components(start))
     quaternion = _quaternion.stack(_quaternion.largest_column(columns))
-    refined = _refine(checked.value, quaternion, step, iterations, escape)
+    refined = _refine(checked.value, quaternion, step, iterations, escape, derivative)
     return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined))).astype(checked.dtype)
 
 
@@ -77,6 +94,7 @@ def refine_quaternion_wxyz(
     step: str = "torque",
     iterations: int = 3,
     escape: bool = False,
+    derivative: str = "implicit",
 ) -> jax.Array:
     """Moves a quaternion (w, x, y, z) towards the rotation nearest to a 3×3 matrix; see `refine_rotation`.
 
@@ -88,14 +106,15 @@ def refine_quaternion_wxyz(
         iterations: How many steps, ≥ 0. Static.
         escape: Leave an equilibrium that is not nearest, before the first step; the sign of a start that is turned is
             free. Static.
+        derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:
         A unit quaternion, shape (..., 4) of the broadcast batch, dtype of `matrix`. Its sign continues that of the
         start: it does not jump from frame to frame, and w may be negative.
 
     Raises:
-        ValueError: Wrong shape, unknown step, negative iterations.
-        TypeError: Complex or non-numeric arrays, traced step, iterations or escape.
+        ValueError: Wrong shape, unknown step or derivative, negative iterations.
+        TypeError: Complex or non-numeric arrays, traced step, iterations, escape or derivative.
 
     Uniqueness:
         As for `refine_rotation`.
@@ -108,20 +127,21 @@ def refine_quaternion_wxyz(
     checked = check_matrix(matrix)
     start = check_start(quaternion_wxyz, "quaternion_wxyz", (4,), checked.value).value
     quaternion = _quaternion.stack(_quaternion.normalise(_quaternion.components(start)))
-    return _refine(checked.value, quaternion, step, iterations, escape).astype(checked.dtype)
+    return _refine(checked.value, quaternion, step, iterations, escape, derivative).astype(checked.dtype)
 
 
-def _refine(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
-    step = check_choice(step, "step", STEPS)
-    matrix = jax.numpy.broadcast_to(matrix, (*quaternion.shape[:-1], 3, 3))
-    return _refined(matrix, quaternion, step, check_iterations(iterations), check_flag(escape, "escape"), 0)
-
-
-@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
-def _refined(
-    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, order: int
+def _refine(
+    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, derivative: str
 ) -> jax.Array:
-    """The iteration, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
+    step = check_choice(step, "step", STEPS)
+    iterations, escape = check_iterations(iterations), check_flag(escape, "escape")
+    matrix = jax.numpy.broadcast_to(matrix, (*quaternion.shape[:-1], 3, 3))
+    if check_choice(derivative, "derivative", _DERIVATIVES) == "unrolled":
+        return _iterated(matrix, quaternion, step, iterations, escape)
+    return _refined(matrix, quaternion, step, iterations, escape, 0)
+
+
+def _iterated(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
     a = scaled(_mat3.components(matrix))
     # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
     zero = a[0][0] * 0
@@ -130,6 +150,14 @@ def _refined(
     if escape:
         q = leave_equilibrium(a, q)
     return _quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
+def _refined(
+    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, order: int
+) -> jax.Array:
+    """The iteration, without its own derivative; `order` counts the derivatives taken, see `_saturation.gain`."""
+    return _iterated(matrix, quaternion, step, iterations, escape)
 
 
 @_refined.defjvp
