@@ -8,12 +8,12 @@ from jax.typing import ArrayLike
 
 from jaxrot import _mat3
 from jaxrot._derivative import inverse_gap_matrix
-from jaxrot._inputs import check_damping, check_flag, check_matrix
+from jaxrot._inputs import check_choice, check_damping, check_flag, check_matrix
 from jaxrot._mat3 import Mat3
-from jaxrot._nearest import nearest_rotation
+from jaxrot._nearest import nearest
 from jaxrot._saturation import factor_of, gain
 from jaxrot._svd import decomposed, inverse_gaps
-from jaxrot.solvers import DEFAULT_METHOD
+from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
 class TwistModes(NamedTuple):
@@ -56,10 +56,9 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
     Source: Kim and Eberle, "Dynamic deformables", 2020 (the rotation gradient), with H instead of singular vectors.
     """
     checked = check_matrix(matrix)
-    a, damping = checked.value, check_damping(damping)
-    rotation = nearest_rotation(a, method=method)
-    inverse = inverse_gap_matrix(a, rotation, damping=damping)
-    return _quadratic_form(_mat3.components(rotation), inverse).astype(checked.dtype)
+    method, damping = check_choice(method, "method", METHODS), check_damping(damping)
+    rotation, inverse = _rotation_and_inverse(checked.value, method, damping)
+    return _quadratic_form(rotation, inverse).astype(checked.dtype)
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
@@ -85,7 +84,7 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
     Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
     """
     checked = check_matrix(matrix)
-    left, _, normalised, right = decomposed(checked.value, 0)
+    left, _, normalised, right = decomposed(checked.value, 1)
     u, v = _mat3.components(left), _mat3.components(right)
     over_sums, _, norm = inverse_gaps(normalised)
     eigenvalues = 2 * jnp.stack(over_sums, axis=-1) * gain(factor_of(checked.value), norm, 0)[..., None]
@@ -125,10 +124,15 @@ def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
     if check_flag(psd, "psd"):
         rotation, inverse = _clamped(checked.value)
     else:
-        r = nearest_rotation(checked.value)
-        rotation, inverse = _mat3.components(r), inverse_gap_matrix(checked.value, r)
+        rotation, inverse = _rotation_and_inverse(checked.value, DEFAULT_METHOD, 0.0)
     jacobian = _quadratic_form(rotation, inverse)
-    return (2 * (jnp.eye(9, dtype=jacobian.dtype) - jacobian)).astype(checked.dtype)
+    return (2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)).astype(checked.dtype)
+
+
+def _rotation_and_inverse(matrix: jax.Array, method: str, damping: float) -> tuple[Mat3, Mat3]:
+    # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
+    rotation = nearest(matrix, method, damping, 1)
+    return _mat3.components(rotation), inverse_gap_matrix(matrix, rotation, damping=damping)
 
 
 def _clamped(matrix: jax.Array) -> tuple[Mat3, Mat3]:
@@ -136,21 +140,28 @@ def _clamped(matrix: jax.Array) -> tuple[Mat3, Mat3]:
 
     Clamped, nothing is large: there is no gap to resolve.
     """
-    left, s, _, right = decomposed(matrix, 0)
+    left, s, _, right = decomposed(matrix, 1)
     v = _mat3.components(right)
     s1, s2, s3 = s[..., 0], s[..., 1], s[..., 2]
     x, y, z = (1 / jnp.maximum(gap, 2) for gap in (s2 + s3, s3 + s1, s1 + s2))
     weighted = [_mat3.multiply_entries(row, (x, y, z)) for row in v]
     inverse = _mat3.multiply((weighted[0], weighted[1], weighted[2]), _mat3.transpose(v))
     rotation = _mat3.multiply(_mat3.components(left), _mat3.transpose(v))
-    return rotation, _mat3.symmetric(inverse)
+    return rotation, inverse
 
 
 def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
-    """T M Tᵀ for a symmetric M, shape (..., 9, 9): its 3×3 blocks are [r_i]× M [r_k]×ᵀ, r the rows of R."""
-    turns = [_mat3.skew(row) for row in rotation]
-    blocks = [[_mat3.multiply(_mat3.multiply(x, m), _mat3.transpose(y)) for y in turns] for x in turns]
-    rows = [[entry for block in row for entry in block[i]] for row in blocks for i in range(3)]
-    # Off the diagonal either entry would do; taking one of the two makes the matrix symmetric to the last digit.
-    entries = [rows[min(i, k)][max(i, k)] for i in range(9) for k in range(9)]
-    return jnp.stack(entries, axis=-1).reshape(*entries[0].shape, 9, 9)
+    """T M Tᵀ, shape (..., 9, 9), for a symmetric M; the rows of T are e_n × r_m, those of [r_m]×, r_m the rows of R.
+
+    By broadcasting, so that XLA writes the 81 entries in one pass and not in 81.
+    """
+    t = jnp.concatenate([_mat3.stack(_mat3.skew(row)) for row in rotation], axis=-2)
+    product = _product(_product(t, _mat3.stack(_mat3.symmetric(m))), jnp.swapaxes(t, -1, -2))
+    # (TM)Tᵀ and its transpose differ in rounding.
+    return 0.5 * (product + jnp.swapaxes(product, -1, -2))
+
+
+def _product(a: jax.Array, b: jax.Array) -> jax.Array:
+    """The matrix product of (..., n, 3) and (..., 3, m), by elementwise products: an accelerator rounds `@` to TF32."""
+    x, y, z = (a[..., :, i, None] * b[..., i, None, :] for i in range(3))
+    return x + y + z

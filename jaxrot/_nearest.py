@@ -48,7 +48,7 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
     """
     checked = check_matrix(matrix)
     method = check_choice(method, "method", METHODS)
-    return _nearest(checked.value, method, check_damping(damping), 0).astype(checked.dtype)
+    return nearest(checked.value, method, check_damping(damping), 0).astype(checked.dtype)
 
 
 def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
@@ -79,20 +79,20 @@ def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, 
     """
     checked = check_matrix(matrix)
     method = check_choice(method, "method", METHODS)
-    rotation = _nearest(checked.value, method, check_damping(damping), 0)
+    rotation = nearest(checked.value, method, check_damping(damping), 0)
     quaternion = _quaternion.from_rotation(_mat3.components(rotation))
     return _quaternion.stack(quaternion).astype(checked.dtype)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1, 2, 3))
-def _nearest(matrix: jax.Array, method: str, damping: float, order: int) -> jax.Array:
-    """The solver, without its own derivative; `order` counts the derivatives taken, see `angular_tangent`."""
+def nearest(matrix: jax.Array, method: str, damping: float, order: int) -> jax.Array:
+    """The solver, without its own derivative; `order` counts the derivatives taken, see `_saturation.gain`."""
     return METHODS[method].solve(matrix)
 
 
-@_nearest.defjvp
+@nearest.defjvp
 def _nearest_jvp(method: str, damping: float, order: int, primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
     # The decorated function, not the solver: or the second derivative would differentiate the algorithm.
-    rotation = _nearest(matrix, method, damping, order + 1)
+    rotation = nearest(matrix, method, damping, order + 1)
     return rotation, rotation_tangent(matrix, rotation, matrix_dot, damping=damping, order=order)

@@ -73,8 +73,9 @@ def refine_rotation(
         `"unrolled"`: the derivative of what was computed, with respect to the matrix and to the start, in forward and
         reverse mode. It is right wherever the iteration stops, for a simulation that is itself differentiated through
         its warm starts for example; memory and time in reverse mode grow with the iterations. At convergence both
-        agree, as fast as the step converges. The start counts as the quaternion of its largest column: a change of a
-        matrix that leaves the rotations has a derivative too, and no meaning.
+        agree, as fast as the step converges. It is not saturated as the rule is: at the ends of the dtype's range it
+        overflows, and that of `torque` where tr(RᵀA) is 0 to the last digit. The start counts as the quaternion of its
+        largest column: a change of a matrix that leaves the rotations has a derivative too, and no meaning.
 
     Source: `STEPS[step].source`; for `torque` with the errata stated in `steps/torque.py`.
     """

@@ -24,7 +24,7 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """The factor, saturated so that the derivatives up to this order stay finite where they would overflow.
 
     The n-th derivative grows like gⁿ, g = factor·norm. Beyond what the dtype holds the product of the factors is held
-    constant, with a margin of 2¹⁰ an order for the number of terms.
+    constant, with a margin of 2¹² an order for the number of terms.
 
     Args:
         factor: The power of two that normalises A, or 0.
@@ -33,9 +33,9 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """
     norm = lax.stop_gradient(norm)
     largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 3)
-    limit = largest * 2.0 ** (-10 * order)
+    limit = largest * 2.0 ** (-12 * order)
     growth = factor * norm
-    lower_orders = 1.0 if order == 0 else jnp.minimum(growth**order, largest * 2.0 ** (-10 * (order - 1)))
+    lower_orders = 1.0 if order == 0 else jnp.minimum(growth**order, largest * 2.0 ** (-12 * (order - 1)))
     return jnp.where(growth <= limit ** (1 / (order + 1)), factor, limit / lower_orders / norm)
 
 

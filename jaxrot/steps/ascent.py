@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._choice import exchange, is_positive
@@ -55,9 +56,9 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
     # Without this half of all starts turn about the axis that a matrix of rank 1 leaves free, by up to 90°.
     u0 = (h01 * l12 - h02) * inverse0
     fourth = square * square
-    part = jnp.where(jnp.abs(last) > torque, jnp.zeros_like(fourth), (u0 * x0 - l12 * x1 + x2) * fourth) / (
-        (u0 * u0 + l12 * l12 + 1) * (pivot**4 + fourth)
-    )
+    # Where one begins and the other ends is a constant to differentiation, whose δ⁻⁸ float32 does not hold.
+    size = lax.stop_gradient((u0 * u0 + l12 * l12 + 1) * (pivot**4 + fourth) / fourth)
+    part = jnp.where(jnp.abs(last) > torque, jnp.zeros_like(fourth), u0 * x0 - l12 * x1 + x2) / size
     x0, x1, x2 = x0 - part * u0, x1 + part * l12, x2 - part
 
     x1, x2 = exchange(third, x1, x2)
