@@ -96,3 +96,18 @@ def resolved(batch: Batch, limit: float | None = None) -> np.ndarray:
     """Which matrices have κ below the limit, 1/(8 eps) when absent, and survive flushing."""
     limit = 1 / (8 * np.finfo(batch.matrices.dtype).eps) if limit is None else limit
     return (batch.condition < limit) & survives_flushing(batch)
+
+
+def analytic_jacobian(matrices, damping=0.0):
+    """The 9×9 Jacobians by the singular vectors: Ṙ = U Ω Vᵀ, Ω_ij = (M_ij − M_ji)/(s_i+s_j), M = UᵀȦV."""
+    solved = reference.solve(matrices)
+    left, right = np.asarray(solved.left), np.asarray(solved.right)
+    sums = np.asarray(solved.singular_values)[..., :, None] + np.asarray(solved.singular_values)[..., None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = sums / (sums**2 + (damping * np.asarray(solved.singular_values).sum(-1))[..., None, None] ** 2)
+    inverse[..., range(3), range(3)] = 0
+    # M for the unit tangents E_kl: M_ij = U_ki V_lj.
+    m = np.einsum("...ki,...lj->...ijkl", left, right)
+    omega = inverse[..., None, None] * (m - m.swapaxes(-4, -3))
+    jacobian = np.einsum("...mi,...ijkl,...nj->...mnkl", left, omega, right)
+    return jacobian.reshape(*jacobian.shape[:-4], 9, 9)

@@ -4,37 +4,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from certificate import assert_within, family_batch, resolved
+from certificate import analytic_jacobian, assert_within, family_batch, resolved
+from differences import POINTS, assert_is_derivative, central_difference
 from jax.test_util import check_grads
+from parts import all_parts, decomposition
 
 from jaxrot import METHODS, nearest_quaternion_wxyz, nearest_rotation
 from jaxrot.report import reference
 
 RANDOM = np.random.default_rng(0)
 DTYPES = ["float32", "float64"]
-POINTS = {
-    "rotation": np.eye(3),
-    "rank two": np.diag([1, 0.7, 0]),
-    "inverted": np.diag([1, 0.8, -0.5]),
-    "equal": np.diag([2.0, 2, -0.5]),
-    "generic": np.array([[1.0, 0.3, -0.2], [0.1, 0.8, 0.4], [-0.3, 0.2, 1.3]]),
-}
 points = pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
-
-
-def analytic_jacobian(matrices, damping=0.0):
-    """The 9×9 Jacobians by the singular vectors: Ṙ = U Ω Vᵀ, Ω_ij = (M_ij − M_ji)/(s_i+s_j), M = UᵀȦV."""
-    solved = reference.solve(matrices)
-    left, right = np.asarray(solved.left), np.asarray(solved.right)
-    sums = np.asarray(solved.singular_values)[..., :, None] + np.asarray(solved.singular_values)[..., None, :]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = sums / (sums**2 + (damping * np.asarray(solved.singular_values).sum(-1))[..., None, None] ** 2)
-    inverse[..., range(3), range(3)] = 0
-    # M for the unit tangents E_kl: M_ij = U_ki V_lj.
-    m = np.einsum("...ki,...lj->...ijkl", left, right)
-    omega = inverse[..., None, None] * (m - m.swapaxes(-4, -3))
-    jacobian = np.einsum("...mi,...ijkl,...nj->...mnkl", left, omega, right)
-    return jacobian.reshape(*jacobian.shape[:-4], 9, 9)
 
 
 @functools.lru_cache
@@ -84,7 +64,13 @@ def test_forward_and_reverse_are_transposes(dtype):
 
 @pytest.mark.parametrize(
     ("function", "highest", "dtype"),
-    [(nearest_rotation, 3, "float32"), (nearest_rotation, 3, "float64"), (nearest_quaternion_wxyz, 2, "float32")],
+    [
+        (nearest_rotation, 3, "float32"),
+        (nearest_rotation, 3, "float64"),
+        (nearest_quaternion_wxyz, 2, "float32"),
+        (decomposition, 2, "float32"),
+        (all_parts, 1, "float32"),
+    ],
 )
 def test_derivatives_of_every_order_are_finite_on_every_family(function, highest, dtype):
     batch = family_batch(dtype)
@@ -114,20 +100,11 @@ THIRD_ALONG = jax.jit(lambda a, tangent: jax.jvp(jax.jacfwd(jax.jacrev(nearest_r
 
 @points
 def test_the_derivative_of_each_order_is_that_of_the_lower_one(matrix):
-    h = 1e-5
+    assert_is_derivative(FIRST, jax.jit(nearest_rotation), matrix)
+    assert_is_derivative(SECOND, FIRST, matrix)
     tangent = np.array([[0.3, -0.5, 0.2], [0.7, 0.1, -0.4], [-0.6, 0.2, 0.5]])
-
-    def difference(function, step):
-        return (np.asarray(function(matrix + h * step)) - np.asarray(function(matrix - h * step))) / (2 * h)
-
-    for function, derivative in ((jax.jit(nearest_rotation), FIRST), (FIRST, SECOND)):
-        got = np.asarray(derivative(matrix))
-        for entry in range(9):
-            expected = difference(function, np.eye(9)[entry].reshape(3, 3))
-            got_entry = got.reshape(*got.shape[:-2], 9)[..., entry]
-            np.testing.assert_allclose(got_entry, expected, atol=2e-8 * max(1, np.abs(got).max()))
     got = np.asarray(THIRD_ALONG(matrix, tangent))
-    np.testing.assert_allclose(got, difference(SECOND, tangent), atol=2e-8 * max(1, np.abs(got).max()))
+    np.testing.assert_allclose(got, central_difference(SECOND, matrix, tangent), atol=2e-8 * max(1, np.abs(got).max()))
 
 
 @points

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from parts import PARTS, all_parts
 
 import jaxrot
 from jaxrot import nearest_quaternion_wxyz, nearest_rotation, refine_quaternion_wxyz, refine_rotation
@@ -15,10 +16,14 @@ FUNCTIONS = {
     "refine_rotation": lambda a: refine_rotation(a, np.eye(3)),
     "refine_quaternion_wxyz": lambda a: refine_quaternion_wxyz(a, np.eye(4)[0]),
 }
-all_functions = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS.keys())
+COMPUTED = {**FUNCTIONS, "all parts": all_parts}
+# What is refused is refused while tracing and compiles nothing: here every function has its turn.
+REFUSING = {**FUNCTIONS, **PARTS}
+all_functions = pytest.mark.parametrize("function", COMPUTED.values(), ids=COMPUTED.keys())
+all_gates = pytest.mark.parametrize("function", REFUSING.values(), ids=REFUSING.keys())
 
 
-@all_functions
+@all_gates
 @pytest.mark.parametrize("shape", [(), (3,), (3, 4), (2, 3), (9,), (3, 3, 5)])
 def test_a_wrong_shape_is_refused_at_trace_time(function, shape):
     with pytest.raises(ValueError, match=r"matrix must be .* shape \(\.\.\., 3, 3\); got shape"):
@@ -32,14 +37,14 @@ def test_trailing_batch_axes_get_the_recipe():
     np.testing.assert_array_equal(np.moveaxis(trailing, -1, 0), nearest_rotation(A))
 
 
-@all_functions
+@all_gates
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128, object, "U1", "M8[s]"])
 def test_a_dtype_that_is_not_real_is_refused(function, dtype):
     with pytest.raises(TypeError, match="matrix must be a real array"):
         function(np.zeros((3, 3)).astype(dtype))
 
 
-@all_functions
+@all_gates
 def test_what_is_no_array_is_refused(function):
     for argument in (None, "rotation", {"a": 1}):
         with pytest.raises(TypeError, match="matrix must be a real array"):
@@ -95,6 +100,12 @@ def test_an_unknown_method_or_step_is_refused_by_name():
         nearest_rotation(A, method="kabsch")
     with pytest.raises(ValueError, match=r"step must be one of .*torque.*; got 'gauss'"):
         refine_rotation(A, np.eye(3), step="gauss")
+    with pytest.raises(ValueError, match=r"derivative must be one of implicit, unrolled; got 'exact'"):
+        refine_rotation(A, np.eye(3), derivative="exact")
+    with pytest.raises(ValueError, match=r"method must be one of .*; got 'kabsch'"):
+        jaxrot.rotation_jacobian(A, method="kabsch")
+    with pytest.raises(TypeError, match="psd must be a static Python bool; got int"):
+        jaxrot.arap_hessian(A, psd=1)  # pyright: ignore[reportArgumentType]
     with pytest.raises(TypeError, match="method must be a string; got int"):
         nearest_rotation(A, method=3)  # pyright: ignore[reportArgumentType]
 
@@ -133,7 +144,7 @@ def test_a_start_of_the_wrong_shape_is_refused():
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(value, dtype):
     clean = A.astype(dtype)
-    for function in map(jax.jit, FUNCTIONS.values()):
+    for function in map(jax.jit, COMPUTED.values()):
         expected = np.delete(np.asarray(function(clean)), 1, 0)
         for entry in range(9):
             spoiled = clean.copy()
@@ -146,7 +157,7 @@ def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(v
 def test_every_public_function_works_without_x64():
     jax.config.update("jax_enable_x64", False)
     try:
-        for name, function in FUNCTIONS.items():
+        for name, function in COMPUTED.items():
             for matrices in (
                 A,
                 A.astype(np.float32),

@@ -48,7 +48,7 @@ MUTANTS = {
     ),
     "raw solver in the rule": Mutant(
         "_nearest.py",
-        "rotation = _nearest(matrix, method, damping, order + 1)",
+        "rotation = nearest(matrix, method, damping, order + 1)",
         "rotation = METHODS[method].solve(matrix)",
         ("test_derivative.py::test_the_second_derivative_is_of_the_rule_and_not_of_the_method",),
     ),
@@ -57,6 +57,24 @@ MUTANTS = {
         "right[..., 2:, :] * sign[..., None, None]",
         "right[..., 2:, :]",
         ("test_methods.py::test_the_controls_are_right_on_every_family_but_for_their_rounding[svd-float64]",),
+    ),
+    "singular vectors that turn the wrong way": Mutant(
+        "_svd.py",
+        "(s1 - s2, s2 - s0, s0 - s1)",
+        "(s2 - s1, s0 - s2, s1 - s0)",
+        ("test_svd.py::test_the_derivatives_are_right_where_singular_values_differ[generic]",),
+    ),
+    "a Hessian that is not projected": Mutant(
+        "_dense.py",
+        "1 / jnp.maximum(gap, 2)",
+        "1 / gap",
+        ("test_dense.py::test_the_hessian_is_that_of_automatic_differentiation_and_its_projection[generic]",),
+    ),
+    "unrolled that is not": Mutant(
+        "_refine.py",
+        'check_choice(derivative, "derivative", _DERIVATIVES) == "unrolled"',
+        'check_choice(derivative, "derivative", _DERIVATIVES) == ""',
+        ("test_refine.py::test_both_derivatives_agree_at_convergence_and_not_before[torque]",),
     ),
     "torque without the absolute value": Mutant(
         "steps/torque.py",

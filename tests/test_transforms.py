@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from jax.sharding import AxisType, NamedSharding
 from jax.sharding import PartitionSpec as P
+from parts import all_parts
 
 from jaxrot import DEFAULT_METHOD, METHODS, STEPS, nearest_quaternion_wxyz, nearest_rotation, refine_rotation
 
@@ -26,6 +27,7 @@ FUNCTIONS = {
     "nearest_rotation": nearest_rotation,
     "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
     "its gradient": gradient_of(nearest_rotation),
+    "all parts": all_parts,
     **{
         f"refine_rotation {step}": functools.partial(refine_rotation, rotation=np.eye(3, dtype=np.float32), step=step)
         for step in STEPS

@@ -1,0 +1,31 @@
+"""Matrices at which derivatives are checked, and central differences to check them with."""
+
+import numpy as np
+
+POINTS = {
+    "rotation": np.eye(3),
+    "rank two": np.diag([1, 0.7, 0]),
+    "inverted": np.diag([1, 0.8, -0.5]),
+    "equal": np.diag([2.0, 2, -0.5]),
+    "generic": np.array([[1.0, 0.3, -0.2], [0.1, 0.8, 0.4], [-0.3, 0.2, 1.3]]),
+}
+# Where singular vectors have a derivative too.
+DISTINCT = {name: POINTS[name] for name in ("rank two", "inverted", "generic")}
+
+
+def central_difference(function, matrix, tangent, h=1e-5):
+    """The change of an array-valued function along a tangent."""
+    ahead, behind = function(matrix + h * tangent), function(matrix - h * tangent)
+    return (np.asarray(ahead) - np.asarray(behind)) / (2 * h)
+
+
+def difference_jacobian(function, matrix, h=1e-5):
+    """The Jacobian, shape (*shape of the result, 3, 3)."""
+    columns = [central_difference(function, matrix, unit, h) for unit in np.eye(9).reshape(9, 3, 3)]
+    return np.stack(columns, axis=-1).reshape(*columns[0].shape, 3, 3)
+
+
+def assert_is_derivative(derivative, function, matrix, digits=2e-8):
+    """`derivative(matrix)`, of any order, is that of `function` by differences."""
+    got = np.asarray(derivative(matrix))
+    np.testing.assert_allclose(got, difference_jacobian(function, matrix), atol=digits * max(1, np.abs(got).max()))

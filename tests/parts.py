@@ -1,0 +1,39 @@
+"""What belongs to the rotation, each function under its name and all of them in one."""
+
+import jax.numpy as jnp
+
+from jaxrot import (
+    arap_hessian,
+    polar_decomposition,
+    rotation_gap,
+    rotation_jacobian,
+    rotation_variant_svd,
+    signed_singular_values,
+    twist_modes,
+)
+
+PARTS = {
+    "polar_decomposition": lambda a: polar_decomposition(a).stretch,
+    "rotation_variant_svd": lambda a: rotation_variant_svd(a).right,
+    "signed_singular_values": signed_singular_values,
+    "rotation_gap": rotation_gap,
+    "rotation_jacobian": rotation_jacobian,
+    "twist_modes": lambda a: twist_modes(a).modes,
+    "arap_hessian": arap_hessian,
+}
+
+
+def decomposition(matrix):
+    """What the decompositions return, and the gap, of every matrix in one row."""
+    return _rows(polar_decomposition(matrix).stretch, *rotation_variant_svd(matrix), rotation_gap(matrix))
+
+
+def all_parts(matrix):
+    """Every part of every matrix in one row, so that tests which only compile do it once."""
+    dense = _rows(rotation_jacobian(matrix), *twist_modes(matrix), arap_hessian(matrix))
+    return jnp.concatenate([decomposition(matrix), dense], axis=-1)
+
+
+def _rows(first, *others):
+    batch = first.shape[:-2]
+    return jnp.concatenate([part.reshape(*batch, -1) for part in (first, *others)], axis=-1)

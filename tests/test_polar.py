@@ -1,0 +1,85 @@
+"""A = R S."""
+
+import jax
+import numpy as np
+import pytest
+from certificate import assert_within, family_batch, survives_flushing
+from differences import POINTS, assert_is_derivative
+
+from jaxrot import nearest_rotation, polar_decomposition
+
+DTYPES = ["float32", "float64"]
+
+
+def stretch(matrix):
+    return polar_decomposition(matrix).stretch
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_parts_make_the_matrix_on_every_family(dtype):
+    batch = family_batch(dtype)
+    eps, tiny = np.finfo(dtype).eps, np.finfo(dtype).tiny
+    rotation, symmetric = (np.asarray(x) for x in jax.jit(polar_decomposition)(batch.matrices))
+    np.testing.assert_array_equal(symmetric, symmetric.swapaxes(1, 2))
+    normal = survives_flushing(batch)
+    size = np.maximum(batch.singular_values[normal][:, 0], tiny)
+    product = rotation[normal].astype(np.longdouble) @ symmetric[normal].astype(np.longdouble)
+    error = np.sqrt(np.square((product - batch.matrices[normal]) / size[:, None, None]).sum((1, 2)))
+    assert_within(error, 32 * eps, batch.families[normal], "R S")
+
+
+def test_the_eigenvalues_of_the_stretch_are_the_signed_singular_values():
+    """One is negative where det A < 0; elsewhere S is the square root of AᵀA."""
+    matrices = np.random.default_rng(0).standard_normal((50, 3, 3))
+    symmetric = np.asarray(stretch(matrices))
+    values = np.linalg.eigvalsh(symmetric)
+    negative = np.linalg.det(matrices) < 0
+    assert negative.any()
+    np.testing.assert_array_equal((values < 0).sum(-1), negative)
+    assert (np.abs(values).argmin(-1) == (0 if negative.all() else values.argmin(-1)))[negative].all()
+    np.testing.assert_allclose(symmetric @ symmetric, matrices.swapaxes(1, 2) @ matrices, atol=1e-13)
+
+
+def test_the_rotation_is_that_of_the_method_asked_for():
+    matrix = POINTS["generic"]
+    for method in ("half_turn", "taylor"):
+        np.testing.assert_array_equal(
+            polar_decomposition(matrix, method=method).rotation, nearest_rotation(matrix, method=method)
+        )
+
+
+FIRST = jax.jit(jax.jacrev(stretch))
+SECOND = jax.jit(jax.jacfwd(jax.jacrev(stretch)))
+
+
+@pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+def test_the_derivatives_of_the_stretch_are_exact_at_equal_singular_values_too(matrix):
+    assert_is_derivative(FIRST, jax.jit(stretch), matrix)
+    assert_is_derivative(SECOND, FIRST, matrix)
+
+
+def test_the_derivative_of_the_stretch_does_not_depend_on_the_scale():
+    """Through R alone it would overflow on the way, or be damped: 1/|A| times |A|."""
+    matrix = POINTS["generic"].astype(np.float32)
+    expected = np.asarray(FIRST(matrix))
+    for exponent in (-120, -60, 60, 120):
+        np.testing.assert_array_equal(FIRST(np.ldexp(matrix, exponent)), expected)
+
+
+def test_forward_and_reverse_are_transposes():
+    matrices, tangent, cotangent = np.random.default_rng(1).standard_normal((3, 20, 3, 3))
+
+    @jax.jit
+    def both(a):
+        return jax.jvp(stretch, (a,), (tangent,))[1], jax.vjp(stretch, a)[1](cotangent)[0]
+
+    forward, reverse = both(matrices)
+    np.testing.assert_allclose(np.sum(forward * cotangent), np.sum(reverse * tangent), rtol=1e-12)
+
+
+def test_what_is_not_asked_for_is_not_computed():
+    matrices = np.random.default_rng(0).standard_normal((1000, 3, 3)).astype(np.float32)
+    functions = (lambda a: polar_decomposition(a).rotation, polar_decomposition)
+    rotation, both = (jax.jit(f).lower(matrices).compile().cost_analysis()["flops"] for f in functions)
+    # A product of matrices is 45 flops, the symmetric part six.
+    assert both > rotation + 40 * len(matrices)

@@ -1,0 +1,100 @@
+"""A = U diag(s) Vᵀ with rotations U and V."""
+
+import jax
+import numpy as np
+import pytest
+from certificate import assert_rotations, assert_within, family_batch, survives_flushing
+from differences import DISTINCT, POINTS, assert_is_derivative
+
+from jaxrot import nearest_rotation, rotation_variant_svd, signed_singular_values
+from jaxrot.report import reference
+
+DTYPES = ["float32", "float64"]
+distinct = pytest.mark.parametrize("matrix", DISTINCT.values(), ids=DISTINCT.keys())
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_factors_are_rotations_in_order_and_make_the_matrix(dtype):
+    batch = family_batch(dtype)
+    eps, tiny = np.finfo(dtype).eps, np.finfo(dtype).tiny
+    left, s, right = (np.asarray(x) for x in jax.jit(rotation_variant_svd)(batch.matrices))
+    for factor in (left, right):
+        assert_rotations(factor, batch.families)
+    assert (s[:, 0] >= s[:, 1]).all()
+    assert (s[:, 1] >= np.abs(s[:, 2])).all()
+    normal = survives_flushing(batch)
+    matrices, names = batch.matrices[normal], batch.families[normal]
+    size = np.maximum(batch.singular_values[normal][:, 0], tiny)
+    error = np.abs(s[normal] - batch.singular_values[normal]).max(-1) / size
+    assert_within(error, 16 * eps, names, "singular values")
+    product = np.einsum("nij,nj,nkj->nik", *(x[normal].astype(np.longdouble) for x in (left, s, right)))
+    error = np.sqrt(np.square((product - matrices) / size[:, None, None]).sum((1, 2)))
+    assert_within(error, 32 * eps, names, "product of the factors")
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_factors_make_the_nearest_rotation(dtype):
+    batch = family_batch(dtype)
+    where = batch.condition < 1e3
+    left, _, right = (np.asarray(x) for x in jax.jit(rotation_variant_svd)(batch.matrices))
+    difference = np.abs(left @ right.swapaxes(1, 2) - np.asarray(jax.jit(nearest_rotation)(batch.matrices)))
+    assert_within(difference[where].max((1, 2)), 32 * np.finfo(dtype).eps, batch.families[where], "left · rightᵀ")
+
+
+def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
+    matrices = np.random.default_rng(0).standard_normal((1000, 3, 3)).astype(np.float32)
+
+    def program(function):
+        return jax.jit(function).lower(matrices).compile()
+
+    alone, whole = program(signed_singular_values), program(rotation_variant_svd)
+    np.testing.assert_allclose(alone(matrices), whole(matrices).singular_values, atol=1e-5)
+    assert alone.cost_analysis()["flops"] < 0.9 * whole.cost_analysis()["flops"]
+    assert alone.memory_analysis().output_size_in_bytes < 0.2 * whole.memory_analysis().output_size_in_bytes
+
+
+def factors_in_one(matrix):
+    left, s, right = rotation_variant_svd(matrix)
+    return jax.numpy.concatenate([left, s[..., None], right], axis=-1)
+
+
+# The factors come out of the same program: at equal singular values another one may choose another basis.
+FIRST_AND_FACTORS = jax.jit(jax.jacfwd(lambda a: 2 * (factors_in_one(a),), has_aux=True))
+VALUES_FIRST = jax.jit(jax.jacrev(signed_singular_values))
+VALUES_SECOND = jax.jit(jax.jacfwd(jax.jacrev(signed_singular_values)))
+
+
+@distinct
+def test_the_derivatives_are_right_where_singular_values_differ(matrix):
+    assert_is_derivative(lambda a: FIRST_AND_FACTORS(a)[0], lambda a: FIRST_AND_FACTORS(a)[1], matrix)
+    assert_is_derivative(VALUES_FIRST, jax.jit(signed_singular_values), matrix)
+    assert_is_derivative(VALUES_SECOND, VALUES_FIRST, matrix)
+
+
+@pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+def test_the_product_of_the_factors_turns_as_the_nearest_rotation_does(matrix):
+    """Equal singular values included, where U and V themselves are damped."""
+    jacobian, factors = (np.asarray(x) for x in FIRST_AND_FACTORS(matrix))
+    left, right = factors[:, :3], factors[:, 4:]
+    product = np.einsum("ijkl,mj->imkl", jacobian[:, :3], right) + np.einsum("ij,mjkl->imkl", left, jacobian[:, 4:])
+    np.testing.assert_allclose(product, jax.jacfwd(nearest_rotation)(matrix), atol=1e-12)
+
+
+def test_singular_values_move_with_the_trace_and_the_sign_of_the_determinant():
+    """d(s1+s2+s3) is the nearest rotation, and s3 passes through 0 with a slope, not with a kink."""
+    gradient = jax.grad(lambda a: signed_singular_values(a).sum())(POINTS["generic"])
+    np.testing.assert_allclose(gradient, nearest_rotation(POINTS["generic"]), atol=1e-14)
+    flat = np.diag([1.0, 0.7, 0.0])
+    assert signed_singular_values(flat + np.diag([0, 0, -1e-3]))[2] == pytest.approx(-1e-3)
+    np.testing.assert_allclose(jax.jacrev(signed_singular_values)(flat)[2], np.diag([0, 0, 1.0]), atol=1e-15)
+
+
+def test_the_factors_at_the_ends_of_the_range_are_those_of_the_middle():
+    matrices = np.random.default_rng(0).standard_normal((16, 3, 3)).astype(np.float32)
+    expected = [np.asarray(x) for x in rotation_variant_svd(matrices)]
+    for exponent in (-100, 100):
+        left, s, right = rotation_variant_svd(np.ldexp(matrices, exponent))
+        np.testing.assert_array_equal(left, expected[0])
+        np.testing.assert_array_equal(right, expected[2])
+        np.testing.assert_array_equal(s, np.ldexp(expected[1], exponent))
+    assert reference.orthogonality_error(expected[0]).max() < 1e-6
