@@ -82,6 +82,11 @@ def test_the_hessian_is_that_of_automatic_differentiation_and_its_projection(mat
     np.testing.assert_array_equal(got, got.T)
 
 
+def test_what_is_compressed_has_no_curvature_along_its_twists():
+    values = np.linalg.eigvalsh(jax.jit(arap_hessian)(np.diag([0.9, 0.6, -0.3])))
+    np.testing.assert_allclose(values, [0, 0, 0, 2, 2, 2, 2, 2, 2], atol=1e-14)
+
+
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_the_projected_hessian_is_semidefinite_on_every_family(dtype):
     batch = family_batch(dtype)
