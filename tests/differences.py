@@ -13,6 +13,14 @@ POINTS = {
 DISTINCT = {name: POINTS[name] for name in ("rank two", "inverted", "generic")}
 
 
+def turned(axis, angle):
+    """The rotation about an axis of any length, by an angle in radians."""
+    axis = np.asarray(axis) / np.linalg.norm(axis)
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
 def central_difference(function, matrix, tangent, h=1e-5):
     """The change of an array-valued function along a tangent."""
     ahead, behind = function(matrix + h * tangent), function(matrix - h * tangent)

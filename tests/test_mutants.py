@@ -74,7 +74,7 @@ MUTANTS = {
         "_refine.py",
         'check_choice(derivative, "derivative", _DERIVATIVES) == "unrolled"',
         'check_choice(derivative, "derivative", _DERIVATIVES) == ""',
-        ("test_refine.py::test_both_derivatives_agree_at_convergence_and_not_before",),
+        ("test_unrolled.py::test_both_derivatives_agree_at_convergence_and_not_before",),
     ),
     "torque without the absolute value": Mutant(
         "steps/torque.py",

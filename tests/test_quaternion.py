@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from certificate import assert_within, family_batch
+from differences import POINTS, assert_is_derivative, turned
 
 from jaxrot import _mat3, _quaternion, nearest_quaternion_wxyz, nearest_rotation
 
@@ -154,10 +155,13 @@ def test_the_nearest_quaternion_is_that_of_the_nearest_rotation_on_every_family(
     assert_within(np.abs(difference).max((1, 2)), 16 * eps, batch.families, "the rotation of the quaternion")
 
 
-def test_the_nearest_quaternion_is_differentiable():
-    matrix = RANDOM.standard_normal((3, 3)) + 2 * np.eye(3)
-    tangent = RANDOM.standard_normal((3, 3))
-    _, got = jax.jvp(nearest_quaternion_wxyz, (matrix,), (tangent,))
-    h = 1e-6
-    ahead, behind = nearest_quaternion_wxyz(matrix + h * tangent), nearest_quaternion_wxyz(matrix - h * tangent)
-    np.testing.assert_allclose(got, (np.asarray(ahead) - np.asarray(behind)) / (2 * h), atol=1e-9)
+FIRST = jax.jit(jax.jacrev(nearest_quaternion_wxyz))
+SECOND = jax.jit(jax.jacfwd(jax.jacrev(nearest_quaternion_wxyz)))
+
+
+@pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+def test_the_derivatives_of_the_nearest_quaternion_are_right(matrix):
+    # From a half turn, where w jumps, a little off.
+    for turn in (np.eye(3), turned([1, 2, 3], 3.0)):
+        assert_is_derivative(FIRST, jax.jit(nearest_quaternion_wxyz), turn @ matrix)
+        assert_is_derivative(SECOND, FIRST, turn @ matrix)
