@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from jaxrot import _mat3
-from jaxrot._choice import is_positive
+from jaxrot._choice import computed_once, is_positive
 from jaxrot._jacobi import diagonalising
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_divide, safe_sqrt
@@ -24,7 +24,7 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     basis of the many, and the diagonal matrix that they make is exact all the same.
 
     Args:
-        m: Any matrix; only the symmetric part above the diagonal is read. Its squares must neither overflow nor
+        m: A symmetric matrix, of which the diagonal and what is above it is read. Its squares must neither overflow nor
             underflow.
 
     Source: Eberly, "A robust eigensolver for 3×3 symmetric matrices", 2014, with Newton's method in the place of the
@@ -62,14 +62,17 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     v: Vec3 = (x * y * quotient, sign + y * y * quotient, -y)
     hu, hv = _mat3.apply(scaled, u), _mat3.apply(scaled, v)
     uu, uv, vv = _mat3.dot(u, hu), _mat3.dot(u, hv), _mat3.dot(v, hv)
+    # Once: what is rounding here decides which of two axes comes first, for their components and for their eigenvalues.
+    uu, uv, vv = computed_once((uu, uv, vv))
     (cosine, sine), t = diagonalising(uu, uv, vv)
-    first, second = uu + t * uv, vv - t * uv
-    first_is_smaller = is_positive(second - first)
+    first_is_smaller = is_positive((vv - t * uv) - (uu + t * uv))
     larger = _mat3.add_vectors(
         _mat3.scale_vector(u, jnp.where(first_is_smaller, -sine, cosine)),
         _mat3.scale_vector(v, jnp.where(first_is_smaller, cosine, sine)),
     )
-    larger_value, smaller_value = jnp.maximum(first, second), jnp.minimum(first, second)
+    # Without t, whose sign is arbitrary where uu = vv: computed twice it once made both eigenvalues the larger one.
+    middle, radius = 0.5 * (uu + vv), 0.5 * safe_sqrt((uu - vv) * (uu - vv) + 4 * uv * uv)
+    larger_value, smaller_value = middle + radius, middle - radius
 
     axis: Vec3 = (x, y, z)
     axis0 = _mat3.where(largest_is_simple, axis, larger)
