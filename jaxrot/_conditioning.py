@@ -8,13 +8,13 @@ from jax.typing import ArrayLike
 from jaxrot._inputs import check_matrix
 from jaxrot._saturation import factor_of, gain
 from jaxrot._scaling import safe_divide
-from jaxrot._svd import decomposed, inverse_gaps, singular_value_tangents
+from jaxrot._svd import decomposed, inverse_sums_and_differences, tangent_in_axes
 
 
 def rotation_gap(matrix: ArrayLike) -> jax.Array:
     """The relative gap (s2+s3)/s1 of the nearest rotation: 0 where that is not unique, 2 for a multiple of a rotation.
 
-    It is 1/κ, κ the condition number of R: a relative error ε in A turns R by about ε/gap.
+    It is 1/κ, κ = s1/(s2+s3): an error of ε s1 in A moves R by up to 2 ε κ, both measured by ‖·‖_F.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
@@ -51,6 +51,6 @@ def _gap_jvp(order: int, primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
     gap = _gap(matrix, order + 1)
     left, _, s, right = decomposed(matrix, order + 1)
-    s1_dot, s2_dot, s3_dot = singular_value_tangents(left, matrix_dot, right)
-    _, _, norm = inverse_gaps(s)
-    return gap, safe_divide(s2_dot + s3_dot - gap * s1_dot, s[..., 0]) * gain(factor_of(matrix), norm, order)
+    m = tangent_in_axes(left, matrix_dot, right)
+    _, _, norm = inverse_sums_and_differences(s)
+    return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], s[..., 0]) * gain(factor_of(matrix), norm, order)

@@ -7,20 +7,21 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
-from jaxrot._derivative import inverse_gap_matrix
+from jaxrot._derivative import inverse_gap_matrix, stretch_tangent
 from jaxrot._inputs import check_choice, check_damping, check_flag, check_matrix
-from jaxrot._mat3 import Mat3
+from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._nearest import nearest
 from jaxrot._saturation import factor_of, gain
-from jaxrot._svd import decomposed, inverse_gaps
+from jaxrot._scaling import safe_divide
+from jaxrot._svd import decomposed, inverse_sums_and_differences
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
 class TwistModes(NamedTuple):
-    """The eigenvectors of the Jacobian of R whose eigenvalue is not 0.
+    """The eigenvectors of the Jacobian of R that are not in its null space.
 
     Attributes:
-        eigenvalues: 2/(s2+s3), 2/(s1+s3), 2/(s1+s2), shape (..., 3), the largest first.
+        eigenvalues: 2/(s2+s3), 2/(s1+s3), 2/(s1+s2), shape (..., 3): the largest first, but for those damped to 0.
         modes: U [eᵢ]× Vᵀ/√2, shape (..., 3, 3, 3), the first of these axes counts them; orthonormal.
     """
 
@@ -40,8 +41,9 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
         damping: Relative damping of H⁻¹, as for `nearest_rotation`. Static.
 
     Returns:
-        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit; exactly symmetric. Accuracy, and what happens
-        where R is not unique, as for the derivative of `nearest_rotation`, which it is.
+        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit; exactly symmetric; inf where the dtype does not
+        hold it. Accuracy, and what happens where R is not unique, as for the derivative of `nearest_rotation`, which it
+        is.
 
     Raises:
         ValueError: Wrong shape, unknown method, negative damping.
@@ -57,8 +59,10 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
     """
     checked = check_matrix(matrix)
     method, damping = check_choice(method, "method", METHODS), check_damping(damping)
-    rotation, inverse = _rotation_and_inverse(checked.value, method, damping)
-    return _quadratic_form(rotation, inverse).astype(checked.dtype)
+    # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
+    rotation = nearest(checked.value, method, damping, 1)
+    inverse = inverse_gap_matrix(checked.value, rotation, damping=damping)
+    return _quadratic_form(_mat3.components(rotation), inverse).astype(checked.dtype)
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
@@ -86,7 +90,7 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
     checked = check_matrix(matrix)
     left, _, normalised, right = decomposed(checked.value, 1)
     u, v = _mat3.components(left), _mat3.components(right)
-    over_sums, _, norm = inverse_gaps(normalised)
+    over_sums, _, norm = inverse_sums_and_differences(normalised)
     eigenvalues = 2 * jnp.stack(over_sums, axis=-1) * gain(factor_of(checked.value), norm, 0)[..., None]
     axes = _mat3.identity_like(u)
     modes = [_mat3.multiply(u, _mat3.multiply(_mat3.skew(axis), _mat3.transpose(v))) for axis in axes]
@@ -116,38 +120,76 @@ def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
         the free axis is 0; not projected, it is 2, because J is damped there.
 
     Derivative:
-        Finite.
+        Right at equal singular values too, to first order; projected it has a kink where sᵢ+sⱼ = 2.
 
     Source: Smith, de Goes and Kim 2019; Lin et al., "Isotropic ARAP energy using Cauchy–Green invariants", 2022.
     """
     checked = check_matrix(matrix)
+    rotation = nearest(checked.value, DEFAULT_METHOD, 0.0, 1)
     if check_flag(psd, "psd"):
-        rotation, inverse = _clamped(checked.value)
+        inverse = _mat3.components(_clamped(checked.value))
     else:
-        rotation, inverse = _rotation_and_inverse(checked.value, DEFAULT_METHOD, 0.0)
-    jacobian = _quadratic_form(rotation, inverse)
+        inverse = inverse_gap_matrix(checked.value, rotation)
+    jacobian = _quadratic_form(_mat3.components(rotation), inverse)
     return (2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)).astype(checked.dtype)
 
 
-def _rotation_and_inverse(matrix: jax.Array, method: str, damping: float) -> tuple[Mat3, Mat3]:
-    # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
-    rotation = nearest(matrix, method, damping, 1)
-    return _mat3.components(rotation), inverse_gap_matrix(matrix, rotation, damping=damping)
+@jax.custom_jvp
+def _clamped(matrix: jax.Array) -> jax.Array:
+    """H⁻¹ with its eigenvalues 1/g held below ½, where those of 2(1 − J) would become negative: V φ(g) Vᵀ.
 
-
-def _clamped(matrix: jax.Array) -> tuple[Mat3, Mat3]:
-    """R, and H⁻¹ with its eigenvalues 1/(sᵢ+sⱼ) held below ½, where those of 2(1 − J) would become negative.
-
-    Clamped, nothing is large: there is no gap to resolve.
+    φ(g) = 1/max(g, 2). Clamped, nothing is large: there is no gap to resolve.
     """
+    _, s, _, right = decomposed(matrix, 1)
+    return _mat3.stack(_in_axes(right, _diagonal(_clamped_inverses(_gaps(s)))))
+
+
+@_clamped.defjvp
+def _clamped_jvp(primals, tangents):
+    # By divided differences of φ (Daleckii and Krein): V's own derivative is damped where singular values are equal,
+    # and there that of V φ Vᵀ exists all the same.
+    (matrix,), (matrix_dot,) = primals, tangents
     left, s, _, right = decomposed(matrix, 1)
     v = _mat3.components(right)
-    s1, s2, s3 = s[..., 0], s[..., 1], s[..., 2]
-    x, y, z = (1 / jnp.maximum(gap, 2) for gap in (s2 + s3, s3 + s1, s1 + s2))
-    weighted = [_mat3.multiply_entries(row, (x, y, z)) for row in v]
-    inverse = _mat3.multiply((weighted[0], weighted[1], weighted[2]), _mat3.transpose(v))
-    rotation = _mat3.multiply(_mat3.components(left), _mat3.transpose(v))
-    return rotation, inverse
+    rotation = _mat3.stack(_mat3.multiply(_mat3.components(left), _mat3.transpose(v)))
+    stretch_dot = _mat3.components(stretch_tangent(matrix, rotation, matrix_dot, order=1))
+    h_dot = _mat3.gap_matrix(_mat3.transpose_multiply(v, _mat3.multiply(stretch_dot, v)))
+    gaps = _gaps(s)
+    tangent = [_mat3.multiply_entries(row, _slopes(gap, gaps)) for row, gap in zip(h_dot, gaps, strict=True)]
+    return _clamped(matrix), _mat3.stack(_in_axes(right, (tangent[0], tangent[1], tangent[2])))
+
+
+def _gaps(singular_values: jax.Array) -> Vec3:
+    s1, s2, s3 = singular_values[..., 0], singular_values[..., 1], singular_values[..., 2]
+    return s2 + s3, s3 + s1, s1 + s2
+
+
+def _clamped_inverses(gaps: Vec3) -> Vec3:
+    x, y, z = (1 / jnp.maximum(gap, 2) for gap in gaps)
+    return x, y, z
+
+
+def _slopes(gap: jax.Array, gaps: Vec3) -> Vec3:
+    """(φ(g) − φ(gᵢ))/(g − gᵢ) for the three gᵢ, φ′ where they are equal: both clamped, 0; neither, −1/(g gᵢ)."""
+
+    def slope(other: jax.Array) -> jax.Array:
+        larger, smaller = jnp.maximum(gap, other), jnp.minimum(gap, other)
+        # The part of the way from the smaller to the larger on which φ is not constant.
+        share = jnp.where(smaller >= 2, jnp.ones_like(gap), safe_divide(jnp.maximum(larger - 2, 0), larger - smaller))
+        return -share / (jnp.maximum(larger, 2) * jnp.maximum(smaller, 2))
+
+    x, y, z = (slope(other) for other in gaps)
+    return x, y, z
+
+
+def _diagonal(v: Vec3) -> Mat3:
+    zero = jnp.zeros_like(v[0])
+    return ((v[0], zero, zero), (zero, v[1], zero), (zero, zero, v[2]))
+
+
+def _in_axes(axes: jax.Array, m: Mat3) -> Mat3:
+    v = _mat3.components(axes)
+    return _mat3.multiply(v, _mat3.multiply(m, _mat3.transpose(v)))
 
 
 def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:

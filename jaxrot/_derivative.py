@@ -65,10 +65,10 @@ def stretch_tangent(matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Arra
     return _mat3.stack(_mat3.symmetric(_mat3.add(along, _mat3.scale(turn, -1.0))))
 
 
-def inverse_gap_matrix(matrix: jax.Array, rotation: jax.Array, *, damping: float = 0.0, order: int = 0) -> Mat3:
+def inverse_gap_matrix(matrix: jax.Array, rotation: jax.Array, *, damping: float = 0.0) -> Mat3:
     """H⁻¹ on components, damped and saturated as in `angular_tangent`, whose arguments it takes."""
-    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, order)
-    return _mat3.scale(inverse, gain(factor_of(matrix), norm, order))
+    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, 0)
+    return _mat3.scale(inverse, gain(factor_of(matrix), norm, 0))
 
 
 def _inverse_gaps(matrix: jax.Array, rotation: jax.Array, damping: float, order: int) -> tuple[Mat3, jax.Array, Mat3]:

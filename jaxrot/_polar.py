@@ -39,7 +39,7 @@ def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> P
 
     Returns:
         R as from `nearest_rotation`, and S in the unit of A, exactly symmetric; by the default method A = R S to 32 eps
-        s1. A matrix with NaN or inf gives NaN.
+        s1, while that is a normal number. inf where S exceeds the dtype; a matrix with NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape, unknown method.
@@ -51,7 +51,8 @@ def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> P
 
     Derivative:
         That of the nearest rotation for R, Ṡ = RᵀȦ − [ω]× S for S, to any order. Exact at equal singular values; along
-        an axis of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. At every scale Ṡ is of the size of Ȧ.
+        an axis of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. Ṡ does not depend on the scale of A, and
+        is at most some κ times Ȧ.
 
     Source: Higham 1986; for R see `nearest_rotation`.
     """

@@ -43,7 +43,8 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
 
     Returns:
         (left, singular_values, right). With eps of the computing dtype: U and V orthogonal to 10 eps, A =
-        U diag(s) Vᵀ to 32 eps s1, s to 16 eps s1. A matrix with NaN or inf gives NaN.
+        U diag(s) Vᵀ to 32 eps s1, s to 16 eps s1, while those are normal numbers. s is inf where it exceeds the dtype;
+        a matrix with NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape.
@@ -54,7 +55,8 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
         equal, or s2 = −s3, a plane of them may turn. They are always the same for the same matrix.
 
     Derivative:
-        Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
+        Forward and reverse, to any order, finite for every finite matrix (reverse mode of a derivative: while ‖A‖ is
+        above 1e-18 in float32). ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
         equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
         one of these is below about 64 eps tr S its part is damped to 0. For functions of the nearest rotation or of
         the stretch use `nearest_rotation` and `polar_decomposition`, which have no difference in a denominator.
@@ -119,11 +121,11 @@ def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax
 def _decomposed_jvp(order: int, primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
     left, s, normalised, right = decomposed(matrix, order + 1)
-    m = _tangent_in_their_axes(left, matrix_dot, right)
+    m = tangent_in_axes(left, matrix_dot, right)
     s_dot = jnp.stack((m[0][0], m[1][1], m[2][2]), axis=-1)
 
     # notation: U̇ = U [p+w]×/2, V̇ = V [p−w]×/2: w is the angular velocity of U Vᵀ, in the axes V.
-    over_sums, over_differences, norm = inverse_gaps(normalised)
+    over_sums, over_differences, norm = inverse_sums_and_differences(normalised)
     factor = factor_of(matrix)
     mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])
     w = scaled_response(functools.partial(_mat3.multiply_entries, over_sums), _mat3.axial(m), factor, norm, order)
@@ -134,28 +136,23 @@ def _decomposed_jvp(order: int, primals, tangents):
     return (left, s, normalised, right), (left_dot, s_dot, normalised_dot, right_dot)
 
 
-def singular_value_tangents(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Vec3:
-    """ṡᵢ = uᵢᵀ Ȧ vᵢ."""
-    m = _tangent_in_their_axes(left, matrix_dot, right)
-    return m[0][0], m[1][1], m[2][2]
-
-
-def _tangent_in_their_axes(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Mat3:
+def tangent_in_axes(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Mat3:
+    """UᵀȦV on components; its diagonal is ṡ."""
     product = _mat3.multiply(_mat3.components(matrix_dot), _mat3.components(right))
     return _mat3.transpose_multiply(_mat3.components(left), product)
 
 
-def inverse_gaps(normalised: jax.Array) -> tuple[Vec3, Vec3, jax.Array]:
+def inverse_sums_and_differences(normalised: jax.Array) -> tuple[Vec3, Vec3, jax.Array]:
     """One over (s2+s3, s3+s1, s1+s2) and one over (s2−s3, s3−s1, s1−s2), damped, and the largest modulus of the six.
 
     Args:
         normalised: The singular values of the normalised A, shape (..., 3).
     """
-    s0, s1, s2 = normalised[..., 0], normalised[..., 1], normalised[..., 2]
-    delta = resolved_gap(s0 + s1 + s2)
+    s1, s2, s3 = normalised[..., 0], normalised[..., 1], normalised[..., 2]
+    delta = resolved_gap(s1 + s2 + s3)
     square = delta * delta
-    a, b, c = (gap / (gap * gap + square) for gap in (s1 + s2, s2 + s0, s0 + s1))
-    d, e, f = (gap / (gap * gap + square) for gap in (s1 - s2, s2 - s0, s0 - s1))
+    a, b, c = (gap / (gap * gap + square) for gap in (s2 + s3, s3 + s1, s1 + s2))
+    d, e, f = (gap / (gap * gap + square) for gap in (s2 - s3, s3 - s1, s1 - s2))
     return (a, b, c), (d, e, f), functools.reduce(jnp.maximum, (jnp.abs(x) for x in (a, b, c, d, e, f)))
 
 

@@ -31,8 +31,8 @@ def test_the_gap_says_how_far_a_disturbance_turns_the_rotation():
     random = np.random.default_rng(0)
     for gap in (1.0, 1e-2, 1e-4):
         matrix = np.diag([1.0, gap, 0.0])
-        noise = 1e-9 * random.standard_normal((2000, 3, 3))
-        noise /= np.linalg.norm(noise, axis=(1, 2), keepdims=True) / 1e-9
+        noise = random.standard_normal((2000, 3, 3))
+        noise *= 1e-9 / np.linalg.norm(noise, axis=(1, 2), keepdims=True)
         turned = np.linalg.norm(np.asarray(nearest_rotation(matrix + noise)) - np.eye(3), axis=(1, 2)).max()
         assert 0.5 < turned * float(rotation_gap(matrix)) / 1e-9 < 2.1
 

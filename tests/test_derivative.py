@@ -93,6 +93,22 @@ def test_derivatives_of_every_order_are_finite_on_every_family(function, highest
         assert_within(largest, np.finfo(dtype).max, batch.families, f"finite derivative of order {order}")
 
 
+@pytest.mark.parametrize("mode", ["forward", "reverse"])
+def test_the_reverse_of_a_derivative_is_finite_on_every_family(mode):
+    """The factors that saturate come in the other order: some are small, and those before them overflow."""
+    batch = family_batch("float32")
+    tangent, cotangent = RANDOM.uniform(-1, 1, (2, *batch.matrices.shape)).astype(np.float32)
+
+    def along(a):
+        if mode == "forward":
+            return jax.jvp(nearest_rotation, (a,), (tangent,))[1]
+        return jax.vjp(nearest_rotation, a)[1](tangent)[0]
+
+    second = jax.jit(lambda a: jax.vjp(along, a)[1](cotangent)[0])
+    largest = np.abs(np.asarray(second(batch.matrices))).max(axis=(1, 2))
+    assert_within(largest, np.finfo(np.float32).max, batch.families, "finite second derivative")
+
+
 FIRST = jax.jit(jax.jacrev(nearest_rotation))
 SECOND = jax.jit(jax.jacfwd(jax.jacrev(nearest_rotation)))
 THIRD_ALONG = jax.jit(lambda a, tangent: jax.jvp(jax.jacfwd(jax.jacrev(nearest_rotation)), (a,), (tangent,))[1])

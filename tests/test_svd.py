@@ -53,6 +53,28 @@ def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
     assert alone.memory_analysis().output_size_in_bytes < 0.2 * whole.memory_analysis().output_size_in_bytes
 
 
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_singular_values_alone_are_right_near_rank_one(dtype):
+    """What decides between the axes of two nearly equal eigenvalues once decided differently for each of them."""
+    random = np.random.default_rng(0)
+    eps, count = np.finfo(dtype).eps, 60_000
+    s = np.ones((count, 3))
+    s[:, 1] = 10 ** random.uniform(np.log10(eps) - 1, 0, count)
+    s[:, 2] = s[:, 1] * random.choice([-1, 1], count) * 10 ** random.uniform(-3, 0, count)
+    left, right = (np.asarray(nearest_rotation(random.standard_normal((count, 3, 3)))) for _ in range(2))
+    matrices = np.einsum("nij,nj,nkj->nik", left, s, right).astype(dtype)
+    matrices[0] = [
+        [0.5950136780738831, 0.13812802731990814, -0.10366281867027283],
+        [-0.26072052121162415, -0.06051095575094223, 0.04541714861989021],
+        [0.7073074579238892, 0.16420301795005798, -0.12323739379644394],
+    ]
+    s[0] = [1, 1.69996e-5, -3.7956e-6]
+    # The matrices are rounded: by up to 2 eps s1.
+    error = np.abs(np.asarray(jax.jit(signed_singular_values)(matrices)) - s).max(-1)
+    assert error[1:].max() < 16 * eps
+    assert error[0] < 16 * np.finfo(np.float32).eps
+
+
 def factors_in_one(matrix):
     left, s, right = rotation_variant_svd(matrix)
     return jax.numpy.concatenate([left, s[..., None], right], axis=-1)

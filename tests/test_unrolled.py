@@ -71,7 +71,7 @@ def test_both_derivatives_agree_at_convergence_and_not_before():
 @pytest.mark.parametrize("step", STEPS)
 def test_the_unrolled_derivative_is_finite_on_every_family(step):
     batch = family_batch("float32")
-    # At 1e-30 the derivative itself overflows; that of `torque` does so where tr(QᵀA) is exactly 0, as from Q = 1.
+    # At 1e-38 the derivative itself overflows; that of `torque` does so where tr(QᵀA) is exactly 0, as from Q = 1.
     where = batch.families != "scale_tiny"
     matrices = batch.matrices[where]
     third = batch.nearest[where] if step == "torque" else np.broadcast_to(np.eye(3), matrices.shape)
