@@ -28,10 +28,14 @@ def decomposition(matrix):
     return _rows(polar_decomposition(matrix).stretch, *rotation_variant_svd(matrix), rotation_gap(matrix))
 
 
+def dense(matrix):
+    """The entries of the 9×9 matrices and of their modes, of every matrix in one row."""
+    return _rows(rotation_jacobian(matrix), *twist_modes(matrix), arap_hessian(matrix))
+
+
 def all_parts(matrix):
     """Every part of every matrix in one row, so that tests which only compile do it once."""
-    dense = _rows(rotation_jacobian(matrix), *twist_modes(matrix), arap_hessian(matrix))
-    return jnp.concatenate([decomposition(matrix), dense], axis=-1)
+    return jnp.concatenate([decomposition(matrix), dense(matrix)], axis=-1)
 
 
 def _rows(first, *others):

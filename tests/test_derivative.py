@@ -7,7 +7,7 @@ import pytest
 from certificate import analytic_jacobian, assert_within, family_batch, resolved
 from differences import POINTS, assert_is_derivative, central_difference
 from jax.test_util import check_grads
-from parts import all_parts, decomposition
+from parts import decomposition, dense
 
 from jaxrot import METHODS, nearest_quaternion_wxyz, nearest_rotation
 from jaxrot.report import reference
@@ -69,7 +69,7 @@ def test_forward_and_reverse_are_transposes(dtype):
         (nearest_rotation, 3, "float64"),
         (nearest_quaternion_wxyz, 2, "float32"),
         (decomposition, 2, "float32"),
-        (all_parts, 1, "float32"),
+        (dense, 1, "float32"),
     ],
 )
 def test_derivatives_of_every_order_are_finite_on_every_family(function, highest, dtype):
