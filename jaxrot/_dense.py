@@ -83,7 +83,7 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
         The modes of equal singular values are one basis of the many.
 
     Derivative:
-        Finite; that of `rotation_variant_svd`.
+        As for `rotation_variant_svd`, with its limits.
 
     Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
     """

@@ -56,10 +56,10 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
 
     Derivative:
         Forward and reverse, to any order, finite for every finite matrix (reverse mode of a derivative: while ‖A‖ is
-        above 1e-18 in float32). ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
-        equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
-        one of these is below about 64 eps tr S its part is damped to 0. For functions of the nearest rotation or of
-        the stretch use `nearest_rotation` and `polar_decomposition`, which have no difference in a denominator.
+        above 1e-18 in float32). ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are equal that is the derivative along this U and
+        V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where one of these is below about 64 eps tr S its
+        part is damped to 0. For functions of the nearest rotation or of the stretch use `nearest_rotation` and
+        `polar_decomposition`, which have no difference in a denominator.
 
     Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
     the eigenvectors of the stretch, by `_symmetric.eigen`.

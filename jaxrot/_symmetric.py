@@ -70,7 +70,8 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
         _mat3.scale_vector(u, jnp.where(first_is_smaller, -sine, cosine)),
         _mat3.scale_vector(v, jnp.where(first_is_smaller, cosine, sine)),
     )
-    # Without t, whose sign is arbitrary where uu = vv: computed twice it once made both eigenvalues the larger one.
+    # Without t, whose sign is arbitrary where uu = vv: two parts of a program that round it differently would give the
+    # larger eigenvalue twice.
     middle, radius = 0.5 * (uu + vv), 0.5 * safe_sqrt((uu - vv) * (uu - vv) + 4 * uv * uv)
     larger_value, smaller_value = middle + radius, middle - radius
 

@@ -55,7 +55,7 @@ def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
 
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_singular_values_alone_are_right_near_rank_one(dtype):
-    """What decides between the axes of two nearly equal eigenvalues once decided differently for each of them."""
+    """What decides between the axes of two nearly equal eigenvalues must decide alike for both."""
     random = np.random.default_rng(0)
     eps, count = np.finfo(dtype).eps, 60_000
     s = np.ones((count, 3))
