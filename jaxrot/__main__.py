@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from jaxrot.console.errors import UserError
 from jaxrot.report import command as report
-from jaxrot.report.errors import ReportError
 
 
 class _Parser(argparse.ArgumentParser):
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
-    except ReportError as error:
+    except UserError as error:
         print(f"{parser.prog} {options.command}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -17,6 +17,8 @@ LAYERS = [
     {"_nearest", "_refine", "_svd"},
     {"_conditioning", "_dense", "_polar"},
     {"__init__"},
+    {"console"},
+    {"scenes"},
     {"report"},
     {"__main__"},
 ]

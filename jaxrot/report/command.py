@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
+from jaxrot.console.errors import UserError
+from jaxrot.console.output import check_writable, write_files
+from jaxrot.console.progress import progress
 from jaxrot.report import bench, render
 from jaxrot.report.environment import describe_environment
-from jaxrot.report.errors import ReportError
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.inputs import Input, dragon_input, read_input, thinned
 from jaxrot.report.measurement import Plan, Results, measure, measuring_configuration, number_of_steps
-from jaxrot.report.output import check_writable, write_files
 from jaxrot.report.pareto import Panel, Point, draw_pareto
-from jaxrot.report.progress import progress
 
 _DTYPES = {"float32": ("float32",), "float64": ("float64",), "both": ("float32", "float64")}
 _LARGEST_BATCH = 10**7
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         The exit status.
 
     Raises:
-        ReportError: Something the user can mend.
+        UserError: Something the user can mend.
     """
     if options.bench:
         return _run_bench(options)
@@ -102,7 +102,7 @@ def _run_bench(options: argparse.Namespace) -> int:
     fixed = ("input", "methods", "dtype", "batch")
     for name in fixed:
         if getattr(options, name) is not None:
-            raise ReportError(f"--bench measures a fixed list; it goes without {', '.join(f'--{x}' for x in fixed)}")
+            raise UserError(f"--bench measures a fixed list; it goes without {', '.join(f'--{x}' for x in fixed)}")
     check_writable(options.out)
     environment = describe_environment(("float32", "float64"))
     with measuring_configuration(), progress(len(bench.GROUPS)) as advance:
@@ -119,7 +119,7 @@ def _run_bench(options: argparse.Namespace) -> int:
 
 def _parse_dtype(word: str) -> tuple[str, ...]:
     if word not in _DTYPES:
-        raise ReportError(f"--dtype {word}: expected one of {', '.join(_DTYPES)}")
+        raise UserError(f"--dtype {word}: expected one of {', '.join(_DTYPES)}")
     return _DTYPES[word]
 
 
@@ -128,7 +128,7 @@ def _parse_methods(words: str) -> tuple[str, ...]:
     unknown = [name for name in names if name not in jaxrot.METHODS]
     if unknown:
         listed = ", ".join(repr(name) for name in unknown)
-        raise ReportError(f"--methods {words}: unknown {listed}; expected some of {', '.join(jaxrot.METHODS)}")
+        raise UserError(f"--methods {words}: unknown {listed}; expected some of {', '.join(jaxrot.METHODS)}")
     return names
 
 
@@ -137,9 +137,9 @@ def _parse_batches(words: str) -> tuple[int, ...]:
     try:
         batches = sorted({int(word) for word in words.split(",")})
     except ValueError:
-        raise ReportError(f"--batch {words}: {expected}") from None
+        raise UserError(f"--batch {words}: {expected}") from None
     if not 1 <= batches[0] <= batches[-1] <= _LARGEST_BATCH:
-        raise ReportError(f"--batch {words}: {expected}")
+        raise UserError(f"--batch {words}: {expected}")
     return tuple(batches)
 
 
@@ -148,7 +148,7 @@ def _check_extra() -> None:
     missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
-        raise ReportError(f"{' and '.join(missing)} {verb} not installed; expected: pip install 'jaxrot[report]'")
+        raise UserError(f"{' and '.join(missing)} {verb} not installed; expected: pip install 'jaxrot[report]'")
 
 
 def _picture(results: Results, given: Input, environment: Mapping[str, str], dtypes: tuple[str, ...]) -> bytes:

@@ -7,8 +7,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from jaxrot.report import dragon
-from jaxrot.report.errors import ReportError
+from jaxrot.console.errors import UserError
+from jaxrot.report import deformed_dragon
 
 EXPECTED = "expected a .npy or .npz file with a real array of shape (..., 3, 3)"
 
@@ -30,10 +30,10 @@ class Input(NamedTuple):
 def dragon_input(cluster_count: int) -> Input:
     """The input that ships with the report."""
     remark = (
-        f"A_pq of {cluster_count} overlapping clusters of {dragon.CLUSTER_SIZE} vertices in each of 15 deformations of"
-        " the dragon (source: Stanford University Computer Graphics Laboratory)."
+        f"A_pq of {cluster_count} overlapping clusters of {deformed_dragon.CLUSTER_SIZE} vertices in each of 15"
+        " deformations of the dragon (source: Stanford University Computer Graphics Laboratory)."
     )
-    return Input(dragon.NAME, dragon.dragon_matrices(cluster_count), (remark,))
+    return Input(deformed_dragon.NAME, deformed_dragon.dragon_matrices(cluster_count), (remark,))
 
 
 def read_input(path: Path) -> Input:
@@ -43,22 +43,22 @@ def read_input(path: Path) -> Input:
     said so.
 
     Raises:
-        ReportError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
+        UserError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
             non-empty array of shape (..., 3, 3).
     """
     if not path.is_file():
-        raise ReportError(f"--input {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
+        raise UserError(f"--input {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
     arrays = _load(path)
     if isinstance(arrays, np.ndarray):
         if (problem := _problem(arrays)) is not None:
-            raise ReportError(f"--input {path}: {problem}; {EXPECTED}")
+            raise UserError(f"--input {path}: {problem}; {EXPECTED}")
         return Input(path.name, {path.stem: _flat(arrays)})
     problems = {name: _problem(array) for name, array in arrays.items()}
     sets = {name: _flat(arrays[name]) for name, problem in problems.items() if problem is None}
     left_out = [f"{name} ({problem})" for name, problem in problems.items() if problem is not None]
     if not sets:
         held = ", ".join(left_out) if left_out else "nothing"
-        raise ReportError(f"--input {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
+        raise UserError(f"--input {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
     remarks = (f"Left out of the file: {', '.join(left_out)}.",) if left_out else ()
     return Input(path.name, sets, remarks)
 
@@ -89,7 +89,7 @@ def _load(path: Path) -> np.ndarray | dict[str, np.ndarray]:
         reason = " ".join(str(error).split())
         if "allow_pickle" in reason or "pickled" in reason:
             reason = "it holds Python objects or is no NumPy file"
-        raise ReportError(f"--input {path}: cannot be read ({reason}); {EXPECTED}") from None
+        raise UserError(f"--input {path}: cannot be read ({reason}); {EXPECTED}") from None
 
 
 def _problem(array: np.ndarray) -> str | None:

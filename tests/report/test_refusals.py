@@ -120,7 +120,7 @@ def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, caps
         raise PermissionError(13, "Permission denied")
 
     # Permission bits do not stop an administrator, and the tests may be run by one.
-    monkeypatch.setattr("jaxrot.report.output.tempfile.mkdtemp", refuse)
+    monkeypatch.setattr("jaxrot.console.output.tempfile.mkdtemp", refuse)
     monkeypatch.setattr(command, "measure", lambda *arguments: pytest.fail("measured"))
     assert "permission denied" in _refused(["report", "--out", tmp_path / "out"], capsys)
 
@@ -134,7 +134,7 @@ def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("jaxrot.report.output.Path.rename", fail)
+    monkeypatch.setattr("jaxrot.console.output.Path.rename", fail)
     text = _refused(["report", "--out", tmp_path / "out", "--methods", "svd"], capsys)
     assert "no space left on device" in text
     assert list(tmp_path.iterdir()) == []

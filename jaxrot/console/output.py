@@ -1,4 +1,4 @@
-"""The report's folder: tried before anything is measured, filled only when everything is there."""
+"""The folder of a command's results: tried before anything is computed, filled only when everything is there."""
 
 import os
 import shutil
@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from jaxrot.report.errors import ReportError
+from jaxrot.console.errors import UserError
 
 
 def check_writable(folder: Path) -> None:
@@ -15,14 +15,14 @@ def check_writable(folder: Path) -> None:
     Permission bits do not tell (an administrator, a read-only file system), so it tries.
 
     Raises:
-        ReportError: The path is a file, leads through one, or cannot be written to.
+        UserError: The path is a file, leads through one, or cannot be written to.
     """
     try:
         if folder.exists() and not folder.is_dir():
-            raise ReportError(f"--out {folder}: this is a file; expected a folder, or a name for a new one")
+            raise UserError(f"--out {folder}: this is a file; expected a folder, or a name for a new one")
         nearest = next(place for place in [folder, *folder.absolute().parents] if place.exists())
         if not nearest.is_dir():
-            raise ReportError(f"--out {folder}: {nearest} is a file; expected a folder, or a name for a new one")
+            raise UserError(f"--out {folder}: {nearest} is a file; expected a folder, or a name for a new one")
         os.rmdir(tempfile.mkdtemp(prefix=".jaxrot-", dir=nearest))
     except OSError as error:
         raise _cannot_write(folder, error) from None
@@ -35,7 +35,7 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
     Other files in an existing folder stay.
 
     Raises:
-        ReportError: Something cannot be written.
+        UserError: Something cannot be written.
     """
     temporary = None
     try:
@@ -58,6 +58,6 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _cannot_write(folder: Path, error: OSError) -> ReportError:
+def _cannot_write(folder: Path, error: OSError) -> UserError:
     reason = (error.strerror or str(error)).lower()
-    return ReportError(f"--out {folder}: cannot be written to ({reason}); expected a folder, or a name for a new one")
+    return UserError(f"--out {folder}: cannot be written to ({reason}); expected a folder, or a name for a new one")

@@ -1,15 +1,17 @@
 """The real input that ships with the report: shape-matching matrices of the Stanford dragon, treated badly.
 
-Source: Müller et al. 2016, section 4 and Fig. 7 (clustered shape matching of this model); the vertices and their
-acknowledgement are in `dragon.npz` and `dragon.txt`.
+Source: Müller et al. 2016, section 4 and Fig. 7 (clustered shape matching of this model); the vertices are
+those of `jaxrot.scenes.dragon`.
 """
 
 import itertools
 from collections.abc import Iterator
-from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
+
+from jaxrot.scenes.clusters import overlapping_clusters
+from jaxrot.scenes.dragon import rest_vertices
 
 NAME = "Stanford dragon"
 CLUSTER_SIZE = 32
@@ -25,40 +27,6 @@ class Stage(NamedTuple):
 
     name: str
     vertices: np.ndarray
-
-
-def rest_vertices() -> np.ndarray:
-    """The vertices at rest, centred and one unit high: float64 of shape (5205, 3), the second axis points up."""
-    with resources.files("jaxrot.report").joinpath("dragon.npz").open("rb") as file, np.load(file) as archive:
-        vertices = archive["vertices"].astype(np.float64)
-    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
-    return (vertices - (lower + upper) / 2) / (upper[1] - lower[1])
-
-
-def overlapping_clusters(vertices: np.ndarray, count: int, size: int = CLUSTER_SIZE) -> np.ndarray:
-    """Clusters that cover the shape evenly and share vertices.
-
-    The seeds are farthest points: each lies as far as possible from those before it. A cluster is the `size` vertices
-    nearest to its seed.
-
-    Args:
-        vertices: Shape (n, 3).
-        count: Number of clusters, at most n.
-        size: Vertices in a cluster, at most n.
-
-    Returns:
-        Vertex indices of shape (count, size), the nearest first.
-    """
-    clusters = np.empty((count, size), dtype=np.intp)
-    distance_to_seeds = np.full(len(vertices), np.inf)
-    seed = 0
-    for row in range(count):
-        distance = np.sum((vertices - vertices[seed]) ** 2, axis=1)
-        nearest = np.argpartition(distance, size - 1)[:size]
-        clusters[row] = nearest[np.argsort(distance[nearest], kind="stable")]
-        distance_to_seeds = np.minimum(distance_to_seeds, distance)
-        seed = int(np.argmax(distance_to_seeds))
-    return clusters
 
 
 def twisted(vertices: np.ndarray, angle: float) -> np.ndarray:
@@ -121,7 +89,7 @@ def cluster_matrices(current: np.ndarray, rest: np.ndarray, clusters: np.ndarray
 def dragon_matrices(cluster_count: int) -> dict[str, np.ndarray]:
     """The matrices of every cluster at every stage, float64, by the name of the stage."""
     rest = rest_vertices()
-    clusters = overlapping_clusters(rest, cluster_count)
+    clusters = overlapping_clusters(rest, cluster_count, CLUSTER_SIZE)
     by_name = itertools.groupby(stages(rest), key=lambda stage: stage.name)
     return {
         name: np.concatenate([cluster_matrices(stage.vertices, rest, clusters) for stage in group])
