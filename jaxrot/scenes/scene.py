@@ -38,5 +38,5 @@ def flops(function: Callable[..., Any], *arguments: Any) -> float:
 
     Loops count once, whatever their number of iterations.
     """
-    cost = jax.jit(function).lower(*arguments).compile().cost_analysis()
+    cost = jax.jit(function).lower(*arguments).compile().cost_analysis() or {}
     return float(cost["flops"])
