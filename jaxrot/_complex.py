@@ -30,20 +30,10 @@ def square(a: Complex) -> jax.Array:
     return a[0] * a[0] + a[1] * a[1]
 
 
-@jax.custom_jvp
 def reciprocal(a: Complex) -> Complex:
     """One over the number."""
     norm = square(a)
     return a[0] / norm, -a[1] / norm
-
-
-@reciprocal.defjvp
-def _reciprocal_jvp(primals, tangents):
-    # The rule of the quotients above has the modulus to the power −4 on the way, which overflows.
-    (a,), (a_dot,) = primals, tangents
-    inverse = reciprocal(a)
-    real, imaginary = multiply(multiply(inverse, inverse), a_dot)
-    return inverse, (-real, -imaginary)
 
 
 def divide(a: Complex, b: Complex) -> Complex:

@@ -8,7 +8,7 @@ from jax.typing import ArrayLike
 from jaxrot._inputs import check_matrix
 from jaxrot._saturation import factor_of, gain
 from jaxrot._scaling import safe_divide
-from jaxrot._svd import decomposed, inverse_sums_and_differences, tangent_in_axes
+from jaxrot._svd import decomposed, reciprocal_gaps, tangent_in_axes
 
 
 def rotation_gap(matrix: ArrayLike) -> jax.Array:
@@ -50,7 +50,8 @@ def _gap(matrix: jax.Array, order: int) -> jax.Array:
 def _gap_jvp(order: int, primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
     gap = _gap(matrix, order + 1)
-    left, _, s, right = decomposed(matrix, order + 1)
+    left, s, normalised, right = decomposed(matrix, order + 1)
     m = tangent_in_axes(left, matrix_dot, right)
-    _, _, norm = inverse_sums_and_differences(s)
-    return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], s[..., 0]) * gain(factor_of(matrix), norm, order)
+    factor = factor_of(matrix)
+    norm = reciprocal_gaps(s, normalised, factor, order + 1).norm
+    return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], normalised[..., 0]) * gain(factor, norm, order)

@@ -13,7 +13,7 @@ from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._nearest import nearest
 from jaxrot._saturation import factor_of, gain
 from jaxrot._scaling import safe_divide
-from jaxrot._svd import decomposed, inverse_sums_and_differences
+from jaxrot._svd import decomposed, reciprocal_gaps
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
@@ -83,15 +83,16 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
         The modes of equal singular values are one basis of the many.
 
     Derivative:
-        As for `rotation_variant_svd`, with its limits.
+        As for `rotation_variant_svd`.
 
     Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
     """
     checked = check_matrix(matrix)
-    left, _, normalised, right = decomposed(checked.value, 1)
+    left, s, normalised, right = decomposed(checked.value, 1)
     u, v = _mat3.components(left), _mat3.components(right)
-    over_sums, _, norm = inverse_sums_and_differences(normalised)
-    eigenvalues = 2 * jnp.stack(over_sums, axis=-1) * gain(factor_of(checked.value), norm, 0)[..., None]
+    factor = factor_of(checked.value)
+    gaps = reciprocal_gaps(s, normalised, factor, 1)
+    eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * gain(factor, gaps.norm, 0)[..., None]
     axes = _mat3.identity_like(u)
     modes = [_mat3.multiply(u, _mat3.multiply(_mat3.skew(axis), _mat3.transpose(v))) for axis in axes]
     stacked = jnp.stack([_mat3.stack(_mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)

@@ -9,15 +9,15 @@ resolved axis, 0 along an axis without a gap, at most 1/(2δ) anywhere.
 """
 
 import functools
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._complex import add, multiply, reciprocal, square, subtract, times
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._saturation import factor_of, gain, scaled_response
+from jaxrot._saturation import factor_of, gain, halves, scaled_response
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
@@ -49,8 +49,10 @@ def angular_tangent(
         ω on components. Finite for every finite A, and its derivatives too.
     """
     torque = _mat3.axial(_mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot)))
-    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, order)
-    return scaled_response(functools.partial(_mat3.apply, inverse), torque, factor_of(matrix), norm, order)
+    gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
+    return scaled_response(
+        functools.partial(_mat3.apply, gaps.inverse), torque, gain(factor_of(matrix), gaps.norm, order)
+    )
 
 
 def stretch_tangent(matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, order: int = 0) -> jax.Array:
@@ -59,29 +61,67 @@ def stretch_tangent(matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Arra
     It does not depend on the scale of A, so that it is right at every scale: ω and S are those of the normalised A.
     """
     along = _mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot))
-    inverse, _, stretch = _inverse_gaps(matrix, rotation, 0.0, order)
-    omega = _mat3.apply(inverse, _mat3.axial(along))
-    turn = _mat3.multiply(_mat3.skew(omega), stretch)
-    return _mat3.stack(_mat3.symmetric(_mat3.add(along, _mat3.scale(turn, -1.0))))
+    gaps = _inverse_gaps(matrix, rotation, 0.0, order + 1)
+    omega = _mat3.apply(gaps.inverse, _mat3.axial(along))
+    turn = _mat3.multiply(_mat3.skew(omega), gaps.stretch)
+    return _mat3.stack(_mat3.symmetric(_mat3.subtract(along, turn)))
 
 
 def inverse_gap_matrix(matrix: jax.Array, rotation: jax.Array, *, damping: float = 0.0) -> Mat3:
     """H⁻¹ on components, damped and saturated as in `angular_tangent`, whose arguments it takes."""
-    inverse, norm, _ = _inverse_gaps(matrix, rotation, damping, 0)
-    return _mat3.scale(inverse, gain(factor_of(matrix), norm, 0))
+    gaps = _inverse_gaps(matrix, rotation, damping, 1)
+    return _mat3.scale(gaps.inverse, gain(factor_of(matrix), gaps.norm, 0))
 
 
-def _inverse_gaps(matrix: jax.Array, rotation: jax.Array, damping: float, order: int) -> tuple[Mat3, jax.Array, Mat3]:
-    """The damped inverse of H of the normalised A, its norm, and the stretch of the normalised A."""
-    stretch = _mat3.transpose_multiply(
-        _mat3.components(rotation), _mat3.components(_normalised(matrix, rotation, order + 1))
+class _InverseGaps(NamedTuple):
+    """What the rule needs of the normalised A: (H+iδ)⁻¹ = `inverse` − i·`unresolved`, its norm, and the stretch S."""
+
+    inverse: Mat3
+    unresolved: Mat3
+    norm: jax.Array
+    stretch: Mat3
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3))
+def _inverse_gaps(matrix: jax.Array, rotation: jax.Array, damping: float, order: int) -> _InverseGaps:
+    """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `gain`."""
+    normalised = _mat3.scale(_mat3.components(matrix), factor_of(matrix))
+    stretch = _mat3.transpose_multiply(_mat3.components(rotation), normalised)
+    return _InverseGaps(
+        *damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping)), stretch
     )
-    inverse, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping))
-    return inverse, norm, stretch
 
 
-def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
-    """H(H²+δ²)⁻¹ = Re (H+iδ)⁻¹, and about the largest singular value of (H+iδ)⁻¹.
+@_inverse_gaps.defjvp
+def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
+    (matrix, rotation), (matrix_dot, _) = primals, tangents
+    gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
+    stretch_dot = _mat3.components(stretch_tangent(matrix, rotation, matrix_dot, order=order))
+    # Half of the gain on either side of the product: reverse mode meets each factor first in one of its terms, and all
+    # of the gain on one side comes too late for another.
+    scale = gain(factor_of(matrix), gaps.norm, order)
+    before, after = halves(scale)
+    halved_dot = _mat3.scale(stretch_dot, before)
+    # δ is linear in |tr S|.
+    delta_dot = resolved_gap(jnp.ones_like(gaps.norm), damping) * _mat3.trace(halved_dot)
+    delta_dot = jnp.where(_mat3.trace(gaps.stretch) < 0, -delta_dot, delta_dot)
+
+    # notation: with P − iQ for (H+iδ)⁻¹, X + iY = (Ḣ+iδ̇)(P−iQ), and the tangent is −(P−iQ)(X+iY).
+    h_dot = _mat3.gap_matrix(halved_dot)
+    x = _mat3.add(_mat3.multiply(h_dot, gaps.inverse), _mat3.scale(gaps.unresolved, delta_dot))
+    y = _mat3.subtract(_mat3.scale(gaps.inverse, delta_dot), _mat3.multiply(h_dot, gaps.unresolved))
+    p, q = _mat3.scale(gaps.inverse, after), _mat3.scale(gaps.unresolved, after)
+    tangent = _InverseGaps(
+        _mat3.symmetric(_mat3.scale(_mat3.add(_mat3.multiply(p, x), _mat3.multiply(q, y)), -1.0)),
+        _mat3.symmetric(_mat3.subtract(_mat3.multiply(p, y), _mat3.multiply(q, x))),
+        jnp.zeros_like(gaps.norm),
+        _mat3.scale(stretch_dot, scale),
+    )
+    return gaps, tangent
+
+
+def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, Mat3, jax.Array]:
+    """H(H²+δ²)⁻¹ and δ(H²+δ²)⁻¹, the parts of (H+iδ)⁻¹, and about its largest singular value.
 
     By LDLᵀ of the complex symmetric H+iδ. Its real and imaginary parts are both semidefinite, so that nothing need be
     exchanged (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts",
@@ -93,7 +133,8 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
         delta: Positive.
 
     Returns:
-        The symmetric matrix, and the largest modulus on the diagonal of (H+iδ)⁻¹: at least a third of its norm.
+        The real part and minus the imaginary one, symmetric, and the largest modulus on the diagonal: at least a third
+        of the norm.
     """
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     r0 = reciprocal((h00, delta))
@@ -110,8 +151,11 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, jax.Array]:
     m01 = add(multiply(l1, r1), multiply(c, last))
     m02, m11 = multiply(c, r2), add(r1, multiply(l12, last))
     largest = jnp.maximum(jnp.maximum(square(m00), square(m11)), square(r2))
-    inverse = ((m00[0], -m01[0], m02[0]), (-m01[0], m11[0], -last[0]), (m02[0], -last[0], r2[0]))
-    return inverse, jnp.sqrt(largest)
+    real, imaginary = (
+        ((m00[part], -m01[part], m02[part]), (-m01[part], m11[part], -last[part]), (m02[part], -last[part], r2[part]))
+        for part in (0, 1)
+    )
+    return real, _mat3.scale(imaginary, -1.0), jnp.sqrt(largest)
 
 
 def resolved_gap(total: jax.Array, damping: float = 0.0) -> jax.Array:
@@ -122,20 +166,3 @@ def resolved_gap(total: jax.Array, damping: float = 0.0) -> jax.Array:
     total = jnp.abs(total)
     delta = max(_RESOLVED * float(jnp.finfo(total.dtype).eps), damping) * total
     return jnp.where(total == 0, jnp.ones_like(total), delta)
-
-
-@functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
-def _normalised(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
-    """A times its power of two; the derivative saturates with the order at which it is taken."""
-    return matrix * factor_of(matrix)[..., None, None]
-
-
-@_normalised.defjvp
-def _normalised_jvp(order: int, primals, tangents):
-    (matrix, rotation), (matrix_dot, _) = primals, tangents
-    value = _normalised(matrix, rotation, order + 1)
-    stretch = _mat3.transpose_multiply(
-        _mat3.components(lax.stop_gradient(rotation)), _mat3.components(lax.stop_gradient(value))
-    )
-    _, norm = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch)))
-    return value, matrix_dot * gain(factor_of(matrix), norm, order)[..., None, None]

@@ -36,6 +36,11 @@ def add(a: Mat3, b: Mat3) -> Mat3:
     return (add_vectors(a[0], b[0]), add_vectors(a[1], b[1]), add_vectors(a[2], b[2]))
 
 
+def subtract(a: Mat3, b: Mat3) -> Mat3:
+    """The difference of two matrices."""
+    return jax.tree.map(lambda x, y: x - y, a, b)
+
+
 def add_vectors(u: Vec3, v: Vec3) -> Vec3:
     """The sum of two vectors."""
     return (u[0] + v[0], u[1] + v[1], u[2] + v[2])

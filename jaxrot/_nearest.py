@@ -42,8 +42,8 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
         Forward and reverse, to any order, by one rule for every method: the derivative of the nearest rotation at the
         returned R. For an approximate method (`METHODS[method].exact` is False) that is not the derivative of its
         formula. Exact at equal singular values; along an axis whose gap sᵢ+sⱼ is below about 64 eps·tr(RᵀA) it tends
-        to 0, and it is finite for every finite matrix; reverse mode of a derivative, where R is not unique, down to
-        ‖A‖ = 1e-25 in float32.
+        to 0. It is finite for every finite matrix, in both modes and one of the other: where the dtype does not hold
+        it, it is saturated.
 
     Source: Müller et al. 2016, section 3 (the problem); `METHODS[method].source` (the algorithm).
     """

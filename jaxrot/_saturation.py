@@ -23,8 +23,8 @@ def factor_of(matrix: jax.Array) -> jax.Array:
 def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """The factor, saturated so that the derivatives up to this order stay finite where they would overflow.
 
-    The n-th derivative grows like gⁿ, g = factor·norm. Beyond what the dtype holds the product of the factors is held
-    constant, with a margin of 2¹² an order for the number of terms.
+    The n-th derivative grows like factorⁿ·norm²ⁿ⁻¹: each one more has the map on both sides. Beyond what the dtype
+    holds the product of the gains and norms is held constant, with a margin of 2¹² an order for the number of terms.
 
     Args:
         factor: The power of two that normalises A, or 0.
@@ -32,24 +32,32 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
         order: How many derivatives have been taken before this one.
     """
     norm = lax.stop_gradient(norm)
-    largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 3)
-    limit = largest * 2.0 ** (-12 * order)
-    growth = factor * norm
-    lower_orders = 1.0 if order == 0 else jnp.minimum(growth**order, largest * 2.0 ** (-12 * (order - 1)))
-    return jnp.where(growth <= limit ** (1 / (order + 1)), factor, limit / lower_orders / norm)
+    largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 4)
+    scale = jnp.minimum(factor, largest / norm)
+    spent = jnp.minimum(factor * norm, largest)
+    for lower in range(1, order + 1):
+        # The minimum keeps XLA from turning x/y/z into x/(y z), which overflows.
+        left = jnp.minimum(largest * 2.0 ** (-12 * lower) / spent, largest)
+        scale = jnp.minimum(factor, left / (norm * norm))
+        spent = spent * (scale * norm) * norm
+    return scale
 
 
-def scaled_response(
-    response: Callable[[Vec3], Vec3], load: Vec3, factor: jax.Array, norm: jax.Array, order: int
-) -> Vec3:
-    """A linear map of a vector, times the saturated factor; arguments as for `gain`.
+def halves(scale: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Two factors of about the same size, the first a power of two, whose product is the scale ≥ 0."""
+    first = power_of_two_factor(lax.rsqrt(jnp.where(scale > 0, scale, jnp.ones_like(scale))))
+    return first, scale / first
 
-    The factor is applied in two halves, before and after: at once it could overflow or underflow on one side. Both are
+
+def scaled_response(response: Callable[[Vec3], Vec3], load: Vec3, scale: jax.Array) -> Vec3:
+    """A linear map of a vector, times a scale ≥ 0 as large or as small as the dtype has.
+
+    The scale is applied in two halves, before and after: at once it could overflow or underflow on one side. Both are
     divisions, because XLA:CPU stores quotients and forms products again in each entry of the result; the transpose,
     the reverse mode, has them in the other order. With products it took 1.7 times as long.
     """
-    first_half = power_of_two_factor(lax.rsqrt(jnp.where(factor > 0, factor, jnp.ones_like(factor))))
-    return _divided(response(_divided(load, 1 / first_half)), first_half / gain(factor, norm, order))
+    before, after = halves(scale)
+    return _divided(response(_divided(load, 1 / before)), 1 / after)
 
 
 def _divided(v: Vec3, divisor: jax.Array) -> Vec3:

@@ -8,10 +8,11 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._complex import Complex, multiply, reciprocal, square, times
 from jaxrot._derivative import resolved_gap
 from jaxrot._inputs import check_matrix
 from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._saturation import factor_of, gain, scaled_response
+from jaxrot._saturation import factor_of, gain, halves, scaled_response
 from jaxrot._scaling import power_of_two, scaled
 from jaxrot._symmetric import eigen
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
@@ -55,11 +56,10 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
         equal, or s2 = −s3, a plane of them may turn. They are always the same for the same matrix.
 
     Derivative:
-        Forward and reverse, to any order, finite for every finite matrix (reverse mode of a derivative: while ‖A‖ is
-        above 1e-18 in float32). ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are equal that is the derivative along this U and
-        V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where one of these is below about 64 eps tr S its
-        part is damped to 0. For functions of the nearest rotation or of the stretch use `nearest_rotation` and
-        `polar_decomposition`, which have no difference in a denominator.
+        Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
+        equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
+        one of these is below about 64 eps tr S its part is damped to 0. For functions of the nearest rotation or of
+        the stretch use `nearest_rotation` and `polar_decomposition`, which have no difference in a denominator.
 
     Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
     the eigenvectors of the stretch, by `_symmetric.eigen`.
@@ -125,14 +125,15 @@ def _decomposed_jvp(order: int, primals, tangents):
     s_dot = jnp.stack((m[0][0], m[1][1], m[2][2]), axis=-1)
 
     # notation: U̇ = U [p+w]×/2, V̇ = V [p−w]×/2: w is the angular velocity of U Vᵀ, in the axes V.
-    over_sums, over_differences, norm = inverse_sums_and_differences(normalised)
     factor = factor_of(matrix)
+    gaps = reciprocal_gaps(s, normalised, factor, order + 1)
+    scale = gain(factor, gaps.norm, order)
     mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])
-    w = scaled_response(functools.partial(_mat3.multiply_entries, over_sums), _mat3.axial(m), factor, norm, order)
-    p = scaled_response(functools.partial(_mat3.multiply_entries, over_differences), mirrored, factor, norm, order)
+    w = scaled_response(functools.partial(_mat3.multiply_entries, gaps.over_sums), _mat3.axial(m), scale)
+    p = scaled_response(functools.partial(_mat3.multiply_entries, gaps.over_differences), mirrored, scale)
     left_dot = _turned(left, _mat3.scale_vector(_mat3.add_vectors(p, w), 0.5))
     right_dot = _turned(right, _mat3.scale_vector(_mat3.add_vectors(p, _mat3.scale_vector(w, -1.0)), 0.5))
-    normalised_dot = s_dot * gain(factor, norm, order + 1)[..., None]
+    normalised_dot = s_dot * gain(factor, gaps.norm, order + 1)[..., None]
     return (left, s, normalised, right), (left_dot, s_dot, normalised_dot, right_dot)
 
 
@@ -142,18 +143,75 @@ def tangent_in_axes(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) ->
     return _mat3.transpose_multiply(_mat3.components(left), product)
 
 
-def inverse_sums_and_differences(normalised: jax.Array) -> tuple[Vec3, Vec3, jax.Array]:
-    """One over (s2+s3, s3+s1, s1+s2) and one over (s2−s3, s3−s1, s1−s2), damped, and the largest modulus of the six.
+class ReciprocalGaps(NamedTuple):
+    """1/(g+iδ) of the sums and differences g of the normalised singular values.
+
+    Attributes:
+        of_sums: Of s2+s3, s3+s1, s1+s2.
+        of_differences: Of s2−s3, s3−s1, s1−s2.
+        norm: The largest modulus of the six. A constant to differentiation.
+    """
+
+    of_sums: tuple[Complex, ...]
+    of_differences: tuple[Complex, ...]
+    norm: jax.Array
+
+    @property
+    def over_sums(self) -> Vec3:
+        """One over the sums, damped: g/(g²+δ²)."""
+        return _real_parts(self.of_sums)
+
+    @property
+    def over_differences(self) -> Vec3:
+        """One over the differences, damped."""
+        return _real_parts(self.of_differences)
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
+def reciprocal_gaps(s: jax.Array, normalised: jax.Array, factor: jax.Array, order: int) -> ReciprocalGaps:
+    """The reciprocals; `order` is that of their derivative, see `_saturation.gain`.
 
     Args:
-        normalised: The singular values of the normalised A, shape (..., 3).
+        s: The singular values, whose tangent is the one used.
+        normalised: Those of the normalised A, shape (..., 3).
+        factor: The power of two between the two.
+        order: How many derivatives have been taken before that of the reciprocals.
     """
-    s1, s2, s3 = normalised[..., 0], normalised[..., 1], normalised[..., 2]
-    delta = resolved_gap(s1 + s2 + s3)
-    square = delta * delta
-    a, b, c = (gap / (gap * gap + square) for gap in (s2 + s3, s3 + s1, s1 + s2))
-    d, e, f = (gap / (gap * gap + square) for gap in (s2 - s3, s3 - s1, s1 - s2))
-    return (a, b, c), (d, e, f), functools.reduce(jnp.maximum, (jnp.abs(x) for x in (a, b, c, d, e, f)))
+    sums, differences, total = _sums_and_differences(normalised)
+    delta = resolved_gap(total)
+    of_sums, of_differences = (tuple(reciprocal((gap, delta)) for gap in gaps) for gaps in (sums, differences))
+    norm = jnp.sqrt(functools.reduce(jnp.maximum, (square(x) for x in (*of_sums, *of_differences))))
+    return ReciprocalGaps(of_sums, of_differences, norm)
+
+
+@reciprocal_gaps.defjvp
+def _reciprocal_gaps_jvp(order: int, primals, tangents):
+    s, normalised, factor = primals
+    s_dot, _, _ = tangents
+    gaps = reciprocal_gaps(s, normalised, factor, order + 1)
+    before, after = halves(gain(factor, gaps.norm, order))
+    sums_dot, differences_dot, total_dot = _sums_and_differences(s_dot * before[..., None])
+    delta_dot = resolved_gap(jnp.ones_like(total_dot)) * total_dot
+
+    def tangent(inverse: Complex, gap_dot: jax.Array) -> Complex:
+        # As in `_derivative`: reverse mode meets each half of the gain before the square that overflows.
+        return multiply(times(inverse, -after), multiply(inverse, (gap_dot, delta_dot)))
+
+    of_sums, of_differences = (
+        tuple(map(tangent, inverses, dots))
+        for inverses, dots in ((gaps.of_sums, sums_dot), (gaps.of_differences, differences_dot))
+    )
+    return gaps, ReciprocalGaps(of_sums, of_differences, jnp.zeros_like(gaps.norm))
+
+
+def _sums_and_differences(s: jax.Array) -> tuple[Vec3, Vec3, jax.Array]:
+    s1, s2, s3 = s[..., 0], s[..., 1], s[..., 2]
+    return (s2 + s3, s3 + s1, s1 + s2), (s2 - s3, s3 - s1, s1 - s2), s1 + s2 + s3
+
+
+def _real_parts(numbers: tuple[Complex, ...]) -> Vec3:
+    (x, _), (y, _), (z, _) = numbers
+    return x, y, z
 
 
 def _turned(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
