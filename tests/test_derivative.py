@@ -66,9 +66,9 @@ def test_forward_and_reverse_are_transposes(dtype):
     ("function", "highest", "dtype"),
     [
         (nearest_rotation, 3, "float32"),
-        (nearest_rotation, 3, "float64"),
-        (nearest_quaternion_wxyz, 2, "float32"),
-        (dense, 1, "float32"),
+        pytest.param(nearest_rotation, 3, "float64", marks=pytest.mark.exhaustive),
+        pytest.param(nearest_quaternion_wxyz, 2, "float32", marks=pytest.mark.exhaustive),
+        pytest.param(dense, 1, "float32", marks=pytest.mark.exhaustive),
     ],
 )
 def test_derivatives_of_every_order_are_finite_on_every_family(function, highest, dtype):
@@ -103,7 +103,12 @@ def matrices_at_every_scale(dtype):
 
 
 @pytest.mark.parametrize(
-    ("function", "mode"), [(nearest_rotation, "forward"), (nearest_rotation, "reverse"), (decomposition, "forward")]
+    ("function", "mode"),
+    [
+        (nearest_rotation, "forward"),
+        pytest.param(nearest_rotation, "reverse", marks=pytest.mark.exhaustive),
+        pytest.param(decomposition, "forward", marks=pytest.mark.exhaustive),
+    ],
 )
 def test_the_reverse_of_a_derivative_is_finite_for_every_matrix(function, mode):
     """The factors that saturate come in the other order: some are small, and those before them overflow."""

@@ -85,6 +85,7 @@ MUTANTS = {
 }
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=MUTANTS.keys())
 def test_a_mutant_is_caught(mutant, tmp_path):
     shutil.copytree(ROOT / "jaxrot", tmp_path / "jaxrot", ignore=shutil.ignore_patterns("__pycache__"))

@@ -68,6 +68,7 @@ def test_both_derivatives_agree_at_convergence_and_not_before():
     assert np.abs(early[1]).max() > 1e-3
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("step", STEPS)
 def test_the_unrolled_derivative_is_finite_on_every_family(step):
     batch = family_batch("float32")
