@@ -8,6 +8,7 @@ from typing import NoReturn
 
 from jaxrot.console.errors import UserError
 from jaxrot.report import command as report
+from jaxrot.simulate import command as simulate
 
 
 class _Parser(argparse.ArgumentParser):
@@ -31,6 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     report_parser = commands.add_parser("report", help="measure error against run time of every method")
     report.add_arguments(report_parser)
     report_parser.set_defaults(run=report.run)
+    simulate_parser = commands.add_parser("simulate", help="run a scene, animate it and watch its health")
+    simulate.add_arguments(simulate_parser)
+    simulate_parser.set_defaults(run=simulate.run)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)

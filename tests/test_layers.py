@@ -19,7 +19,7 @@ LAYERS = [
     {"__init__"},
     {"console"},
     {"scenes"},
-    {"report"},
+    {"report", "simulate"},
     {"__main__"},
 ]
 CORE = {name for layer in LAYERS[:8] for name in layer}

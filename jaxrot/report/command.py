@@ -1,18 +1,17 @@
 """`python -m jaxrot report`: options, their checks, and the order of things."""
 
 import argparse
-import importlib.util
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
+from jaxrot.console.environment import describe_environment
 from jaxrot.console.errors import UserError
+from jaxrot.console.extras import check_installed
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.progress import progress
 from jaxrot.report import bench, render
-from jaxrot.report.environment import describe_environment
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.inputs import Input, dragon_input, read_input, thinned
 from jaxrot.report.measurement import Plan, Results, measure, measuring_configuration, number_of_steps
@@ -76,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         matrices_a_family=size.matrices_a_family,
         timing_budget_s=size.timing_budget_s,
     )
-    _check_extra()
+    check_installed(["matplotlib"], "report")
     check_writable(options.out)
     given = (
         dragon_input(size.clusters) if options.input is None else thinned(read_input(options.input), size.most_matrices)
@@ -141,14 +140,6 @@ def _parse_batches(words: str) -> tuple[int, ...]:
     if not 1 <= batches[0] <= batches[-1] <= _LARGEST_BATCH:
         raise UserError(f"--batch {words}: {expected}")
     return tuple(batches)
-
-
-def _check_extra() -> None:
-    needed = ["matplotlib"] + (["tqdm"] if sys.stderr.isatty() else [])
-    missing = [name for name in needed if importlib.util.find_spec(name) is None]
-    if missing:
-        verb = "is" if len(missing) == 1 else "are"
-        raise UserError(f"{' and '.join(missing)} {verb} not installed; expected: pip install 'jaxrot[report]'")
 
 
 def _picture(results: Results, given: Input, environment: Mapping[str, str], dtypes: tuple[str, ...]) -> bytes:

@@ -1,0 +1,40 @@
+"""Mesh files of the user's, in any format that meshio reads."""
+
+import contextlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def read(path: Path) -> Any:
+    """What meshio finds in the file, a `meshio.Mesh`.
+
+    Raises:
+        ValueError: meshio is not installed, the file is missing or cannot be read.
+    """
+    try:
+        import meshio
+    except ImportError:
+        raise ValueError("meshio is not installed; expected: pip install 'jaxrot[scenes]'") from None
+    # meshio prints what goes wrong, and ends the process.
+    messages = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(messages), contextlib.redirect_stderr(messages):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        known = isinstance(error, meshio.ReadError | OSError) and str(error)
+        raise ValueError(f"cannot be read ({' '.join(str(error).split()) if known else 'not a mesh file'})") from None
+
+
+def vertices(path: Path) -> np.ndarray:
+    """The vertices in the file, float64 of shape (n, 3).
+
+    Raises:
+        ValueError: It cannot be read, or has none.
+    """
+    points = np.asarray(read(path).points, dtype=np.float64)
+    if not len(points) or points.shape[1] != 3:
+        raise ValueError(f"the mesh has no vertices in space; its points have shape {points.shape}")
+    return points

@@ -1,0 +1,1 @@
+"""`python -m jaxrot simulate SCENE`: runs a scene, draws it, and says how it fared."""

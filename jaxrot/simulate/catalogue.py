@@ -1,0 +1,41 @@
+"""The scenes by name."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from jaxrot.scenes import mesh_file, tetrahedra
+from jaxrot.scenes.dragon import dragon, dragon_fine
+from jaxrot.scenes.drift import drift
+from jaxrot.scenes.drop import drop
+from jaxrot.scenes.finite_elements import cantilever, recovery
+from jaxrot.scenes.scene import Scene
+from jaxrot.scenes.tetrahedron import tetrahedron
+
+
+class Entry(NamedTuple):
+    """A scene that can be run by name.
+
+    Attributes:
+        build: The scene, of the mesh if there is one.
+        read_mesh: What it takes of a mesh file of the user's; None: it takes none.
+        summary: One line.
+    """
+
+    build: Callable[..., Scene]
+    read_mesh: Callable[[Path], Any] | None
+    summary: str
+
+
+SCENES: Mapping[str, Entry] = MappingProxyType(
+    {
+        "dragon": Entry(dragon, mesh_file.vertices, "clustered shape matching: scrambled vertices find their shape"),
+        "dragon_fine": Entry(dragon_fine, None, "the same with 22,998 vertices"),
+        "drop": Entry(drop, mesh_file.vertices, "clustered shape matching: a soft body falls onto a block"),
+        "cantilever": Entry(cantilever, tetrahedra.read, "co-rotational finite elements: a beam under its weight"),
+        "recovery": Entry(recovery, tetrahedra.read, "co-rotational finite elements: an exploded block recovers"),
+        "drift": Entry(drift, None, "a million products of rotations, repaired and not"),
+        "tetrahedron": Entry(tetrahedron, None, "a tetrahedron pressed through its base, Müller et al. 2016, Fig. 3"),
+    }
+)

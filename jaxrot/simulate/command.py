@@ -1,0 +1,115 @@
+"""`python -m jaxrot simulate`: options, their checks, and the order of things."""
+
+import argparse
+import json
+from pathlib import Path
+
+from jaxrot.console.environment import describe_environment
+from jaxrot.console.errors import UserError
+from jaxrot.console.extras import check_installed
+from jaxrot.console.output import check_writable, write_files
+from jaxrot.console.progress import progress
+from jaxrot.scenes.scene import Scene
+from jaxrot.simulate.animation import draw_animation
+from jaxrot.simulate.catalogue import SCENES
+from jaxrot.simulate.health import as_csv, complaints, draw_health
+from jaxrot.simulate.recording import Recording, record
+
+_FRAMES = 100
+_MOST_STEPS = 10**8
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the options of a simulation."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    width = max(map(len, SCENES))
+    parser.epilog = "scenes:\n" + "\n".join(f"  {name:{width}}  {entry.summary}" for name, entry in SCENES.items())
+    parser.add_argument("scene", metavar="SCENE", help="which scene, see below")
+    parser.add_argument("--steps", metavar="N", help="how many steps (the scene's own choice)")
+    parser.add_argument("--mesh", type=Path, metavar="FILE", help="a mesh of your own, in a format that meshio reads")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write (jaxrot-SCENE/)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs the scene, draws it, writes and prints; the user's mistakes are found before anything is computed.
+
+    Returns:
+        The exit status: 0; 130 where the run was interrupted, and what it had done was written.
+
+    Raises:
+        UserError: Something the user can mend.
+    """
+    if options.scene not in SCENES:
+        raise UserError(f"unknown scene {options.scene}; expected one of {', '.join(SCENES)}")
+    steps = None if options.steps is None else _parse_steps(options.steps)
+    folder = options.out or Path(f"jaxrot-{options.scene}")
+    check_installed(["matplotlib"], "scenes")
+    check_writable(folder)
+    scene = _build(options.scene, options.mesh)
+    steps = scene.steps if steps is None else steps
+    environment = describe_environment(("float32",))
+    with progress(min(steps, _FRAMES) + 1) as advance:
+        recording = record(scene, steps, _FRAMES, advance)
+        advance("drawing")
+        files = {
+            "animation.gif": draw_animation(recording, scene.lines, scene.title),
+            "health.png": draw_health(recording, scene.title),
+            "health.csv": as_csv(recording).encode(),
+            "run.json": json.dumps(_summary(options.scene, recording, environment), indent=2).encode(),
+        }
+    write_files(folder, files)
+    print(_text(scene, recording))
+    if recording.steps < steps:
+        print(f"\nInterrupted after {recording.steps:,} of {steps:,} steps.")
+    print(f"\nWritten to {folder}: {', '.join(files)}")
+    return 0 if recording.steps == steps else 130
+
+
+def _build(name: str, mesh: Path | None) -> Scene:
+    entry = SCENES[name]
+    if mesh is None:
+        return entry.build()
+    if entry.read_mesh is None:
+        able = ", ".join(name for name, entry in SCENES.items() if entry.read_mesh is not None)
+        raise UserError(f"--mesh {mesh}: {name} takes no mesh; expected one of {able}")
+    try:
+        return entry.build(entry.read_mesh(mesh))
+    except ValueError as error:
+        raise UserError(f"--mesh {mesh}: {error}") from None
+
+
+def _parse_steps(word: str) -> int:
+    try:
+        steps = int(word.replace("_", ""))
+    except ValueError:
+        steps = 0
+    if not 1 <= steps <= _MOST_STEPS:
+        raise UserError(f"--steps {word}: expected a whole number from 1 to {_MOST_STEPS:,}")
+    return steps
+
+
+def _summary(name: str, recording: Recording, environment: dict[str, str]) -> dict[str, object]:
+    return {
+        "scene": name,
+        "steps": recording.steps,
+        "seconds": recording.seconds,
+        "compile_seconds": recording.compile_seconds,
+        "complaints": complaints(recording),
+        "environment": environment,
+    }
+
+
+def _text(scene: Scene, recording: Recording) -> str:
+    lines = [scene.title, ""]
+    if recording.steps:
+        rate = recording.steps / recording.seconds
+        simulated = recording.steps * scene.step_seconds
+        lines.append(
+            f"{recording.steps:,} steps in {recording.seconds:.3g} s, {rate:,.0f} a second, {simulated:.3g} s simulated"
+            f" (compiled in {recording.compile_seconds:.2g} s)"
+        )
+    width = max(map(len, recording.health))
+    lines += [f"{'':{width}}  {'first':>10}  {'largest':>10}  {'last':>10}"]
+    for name, values in recording.health.items():
+        lines.append(f"{name:{width}}  {values[0]:10.3g}  {values.max():10.3g}  {values[-1]:10.3g}")
+    return "\n".join(lines + complaints(recording))

@@ -1,0 +1,78 @@
+"""The health of a run: a plot of what was watched, the same numbers as a table, and what went wrong."""
+
+import csv
+import io
+import itertools
+import re
+
+import numpy as np
+
+from jaxrot.simulate.recording import Recording
+
+# Okabe and Ito's colours, told apart without seeing red or green.
+_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#000000")
+
+
+def draw_health(recording: Recording, title: str) -> bytes:
+    """A panel for each unit, what is never negative and spans decades on a logarithmic axis."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = _by_unit(recording.health)
+    columns = min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(5 * columns, 2.7 * rows + 0.5), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=11)
+    for number, (unit, names) in enumerate(panels.items(), start=1):
+        axes = figure.add_subplot(rows, columns, number)
+        for name, color in zip(names, itertools.cycle(_COLORS)):
+            axes.plot(recording.times, recording.health[f"{name} ({unit})"], color=color, label=name, linewidth=1.4)
+        _scale(axes, np.concatenate([recording.health[f"{name} ({unit})"] for name in names]))
+        axes.set_xlabel("simulated time (s)")
+        axes.set_ylabel("without unit" if unit == "1" else unit)
+        axes.legend(fontsize=8, frameon=False)
+        axes.grid(alpha=0.3)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
+
+
+def as_csv(recording: Recording) -> str:
+    """A row a frame."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(["time (s)", *recording.health])
+    writer.writerows(
+        zip(recording.times.tolist(), *(values.tolist() for values in recording.health.values()), strict=True)
+    )
+    return buffer.getvalue()
+
+
+def complaints(recording: Recording) -> list[str]:
+    """One line for each watched number, and for the points, that did not stay finite."""
+    finite = {name: np.isfinite(values) for name, values in recording.health.items()}
+    finite["a position"] = np.isfinite(recording.points).all(axis=(1, 2))
+    return [
+        f"{name} is not finite from t = {recording.times[np.argmin(ok)]:.3g} s on"
+        for name, ok in finite.items()
+        if not ok.all()
+    ]
+
+
+def _by_unit(health: dict[str, np.ndarray]) -> dict[str, list[str]]:
+    panels: dict[str, list[str]] = {}
+    for full_name in health:
+        match = re.fullmatch(r"(.*) \((.*)\)", full_name)
+        if match is None:
+            raise ValueError(f"a watched number is named with its unit: 'kinetic energy (J)'; got {full_name!r}")
+        panels.setdefault(match[2], []).append(match[1])
+    return panels
+
+
+def _scale(axes, values: np.ndarray) -> None:
+    positive = values[np.isfinite(values) & (values > 0)]
+    if (values < 0).any() or not len(positive) or positive.max() < 1e3 * positive.min():
+        return
+    # What is 0 stays visible, at the lower edge.
+    axes.set_yscale("symlog", linthresh=max(float(positive.min()), 1e-12 * float(positive.max())))
