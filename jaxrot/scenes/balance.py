@@ -36,7 +36,7 @@ def without_momentum(changes: jax.Array, arms: jax.Array, shares: jax.Array) -> 
 
 
 def cross(u: jax.Array, v: jax.Array) -> jax.Array:
-    """u × v along the last axis."""
+    """The vector product u × v along the last axis."""
     (ux, uy, uz), (vx, vy, vz) = (jnp.moveaxis(x, -1, 0) for x in (u, v))
     return jnp.stack(_mat3.cross((ux, uy, uz), (vx, vy, vz)), axis=-1)
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot.scenes.clusters import incidence, padded
+from jaxrot.scenes.clusters import covering_clusters, incidence, padded, spread_clusters
 
 
 class Body(NamedTuple):
@@ -41,7 +41,7 @@ class Body(NamedTuple):
 
 def build_body(
     rest_vertices: ArrayLike,
-    clusters: Sequence[Sequence[int]] | np.ndarray,
+    clusters: Sequence[Sequence[int] | np.ndarray] | np.ndarray,
     masses: ArrayLike | None = None,
     *,
     dtype: type = np.float32,
@@ -55,13 +55,15 @@ def build_body(
         dtype: Of the floating-point arrays.
 
     Raises:
-        ValueError: No or non-finite vertices; a mass that is not positive; a cluster that is empty, holds a vertex twice
-            or one that does not exist; a vertex in no cluster.
+        ValueError: No or non-finite vertices; a mass that is not positive; a cluster that is empty, holds a vertex
+            twice or one that does not exist; a vertex in no cluster.
     """
     vertices = checked_vertices(rest_vertices)
     mass = np.full(len(vertices), 1 / len(vertices)) if masses is None else np.asarray(masses, dtype=np.float64)
     if mass.shape != (len(vertices),) or not (np.isfinite(mass).all() and (mass > 0).all()):
-        raise ValueError(f"masses must be {len(vertices)} positive finite numbers; got shape {mass.shape}{_worst(mass)}")
+        raise ValueError(
+            f"masses must be {len(vertices)} positive finite numbers; got shape {mass.shape}{_worst(mass)}"
+        )
     members, filled = padded(clusters, len(vertices))
     places, counts = incidence(members, filled, len(vertices))
     shares = np.where(filled, (mass / counts)[members], 0.0)
@@ -77,6 +79,30 @@ def build_body(
         jnp.asarray(places, jnp.int32),
         jnp.asarray(counts, dtype),
     )
+
+
+def build_two_scale_body(
+    rest_vertices: ArrayLike, masses: ArrayLike | None = None, *, cluster_size: int = 32, dtype: type = np.float32
+) -> Body:
+    """The body in clusters of neighbours, two for every vertex on average, and one of vertices from all over it.
+
+    Args:
+        rest_vertices: Shape (n, 3), m.
+        masses: Of the vertices, kg, shape (n,); 1/n each if not given.
+        cluster_size: Vertices in a cluster.
+        dtype: Of the floating-point arrays.
+
+    Raises:
+        ValueError: As `build_body`; a size that is not positive.
+
+    Building takes time like n², a second for 23,000 vertices; a step takes time like n.
+    """
+    if cluster_size < 1:
+        raise ValueError(f"cluster_size must be positive; got {cluster_size}")
+    vertices = checked_vertices(rest_vertices)
+    size = min(cluster_size, len(vertices))
+    neighbours = covering_clusters(vertices, -(-2 * len(vertices) // size) if size > 1 else len(vertices), size)
+    return build_body(vertices, [*neighbours, *spread_clusters(len(vertices), size)], masses, dtype=dtype)
 
 
 def checked_vertices(vertices: ArrayLike, name: str = "vertices") -> np.ndarray:

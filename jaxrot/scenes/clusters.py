@@ -74,7 +74,9 @@ def spread_clusters(vertex_count: int, size: int) -> list[np.ndarray]:
     return [order[row::count] for row in range(count)]
 
 
-def padded(clusters: Sequence[Sequence[int]] | np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def padded(
+    clusters: Sequence[Sequence[int] | np.ndarray] | np.ndarray, vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Clusters of any lengths as one table.
 
     Args:

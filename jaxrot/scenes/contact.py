@@ -1,13 +1,16 @@
 """Contact of points with a ground plane and axis-aligned boxes: positions are moved out, velocities answer."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.typing import ArrayLike
 
 from jaxrot._scaling import safe_divide, safe_sqrt
+
+# Lower and upper corner, each of three numbers.
+Corners = Sequence[Sequence[float]] | np.ndarray
 
 
 class Contact(NamedTuple):
@@ -38,8 +41,8 @@ class Motion(NamedTuple):
 def build_contact(
     *,
     ground_height: float = -np.inf,
-    box: ArrayLike = ((-np.inf,) * 3, (np.inf,) * 3),
-    obstacle: ArrayLike = ((np.inf,) * 3, (-np.inf,) * 3),
+    box: Corners = ((-np.inf,) * 3, (np.inf,) * 3),
+    obstacle: Corners = ((np.inf,) * 3, (-np.inf,) * 3),
     restitution: float = 0.0,
     friction: float = 0.5,
     dtype: type = np.float32,

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import nearest_rotation, rotation_gap
+from jaxrot._scaling import safe_divide
 from jaxrot.scenes.balance import cross
 from jaxrot.scenes.shape_matching import Parameters, State, fit_clusters, turned_offsets
 
@@ -34,8 +35,8 @@ def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
     return {
         "kinetic energy (J)": 0.5 * jnp.sum(masses * state.velocities**2),
         "elastic energy (J)": 0.5 * parameters.stiffness / parameters.time_step**2 * elastic,
-        "linear momentum (kg m/s)": jnp.sqrt(jnp.sum(momentum**2)),
-        "angular momentum (kg m²/s)": jnp.sqrt(jnp.sum(jnp.sum(masses * cross(arms, relative), axis=0) ** 2)),
+        "linear momentum (kg m/s)": _length(momentum),
+        "angular momentum (kg m²/s)": _length(jnp.sum(masses * cross(arms, relative), axis=0)),
         "smallest rotation gap": jnp.min(rotation_gap(fit.matrices)),
         "worst orthogonality": jnp.max(jnp.sqrt(jnp.sum(defect**2, axis=(-2, -1)))),
         "shape error (of the diagonal)": shape_error(state.positions, body.rest_positions),
@@ -50,3 +51,9 @@ def shape_error(positions: jax.Array, rest_positions: jax.Array) -> jax.Array:
     turned = jnp.sum(rotation[None] * q[:, None, :], axis=-1)
     diagonal = jnp.sqrt(jnp.sum((jnp.max(q, axis=0) - jnp.min(q, axis=0)) ** 2))
     return jnp.sqrt(jnp.mean(jnp.sum((x - turned) ** 2, axis=-1))) / diagonal
+
+
+def _length(vector: jax.Array) -> jax.Array:
+    # Squares of a momentum overflow long before the momentum does.
+    largest = jnp.max(jnp.abs(vector))
+    return largest * jnp.sqrt(jnp.sum(safe_divide(vector, jnp.broadcast_to(largest, vector.shape)) ** 2))

@@ -3,6 +3,7 @@
 Source: Müller et al. 2005, "Meshless deformations based on shape matching"; Müller et al. 2016, sections 1 and 4.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -68,7 +69,7 @@ def build_parameters(
     time_step: float = 1 / 60,
     stiffness: float = 1.0,
     damping: float = 0.5,
-    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     contact: Contact | None = None,
 ) -> Parameters:
     """Parameters in the dtype of the body.
@@ -85,8 +86,8 @@ def build_parameters(
     if np.shape(gravity) != (3,) or not np.isfinite(np.asarray(gravity)).all():
         raise ValueError(f"gravity must be three finite numbers; got {gravity}")
     dtype = body.masses.dtype
-    numbers = (jnp.asarray(value, dtype) for value in (time_step, stiffness, damping, gravity))
-    return Parameters(body, *numbers, build_contact(dtype=dtype.type) if contact is None else contact)
+    h, alpha, c, g = (jnp.asarray(value, dtype) for value in (time_step, stiffness, damping, gravity))
+    return Parameters(body, h, alpha, c, g, build_contact(dtype=dtype.type) if contact is None else contact)
 
 
 def build_state(body: Body, positions: ArrayLike | None = None, velocities: ArrayLike | None = None) -> State:
@@ -166,7 +167,8 @@ def step(
         )
     else:
         rotations = nearest_rotation(fit.matrices, method=method)
-    changes = (turned_offsets(rotations, body) - fit.arms) * (parameters.stiffness / h)
+    # Divided last: a quotient XLA:CPU computes once, a product anew for every sum that it goes into.
+    changes = parameters.stiffness * (turned_offsets(rotations, body) - fit.arms) / h
     if conserve_angular_momentum and not damping:
         changes = without_momentum(changes, fit.arms, shares)
     if damping:
