@@ -45,20 +45,22 @@ def dragon(mesh_vertices: ArrayLike | None = None) -> Scene:
     Raises:
         ValueError: Vertices of another shape, or not finite.
     """
-    name = "Stanford dragon" if mesh_vertices is None else "Body"
-    return _recovery(name, standing_vertices() if mesh_vertices is None else checked_vertices(mesh_vertices))
+    if mesh_vertices is not None:
+        return _recovery("Body", checked_vertices(mesh_vertices), seed=0)
+    # Scrambled, the body has no orientation left but by chance. This dragon ends on its feet, 20° off.
+    return _recovery("Stanford dragon", standing_vertices(), seed=23)
 
 
 def dragon_fine() -> Scene:
     """The dragon with 22,998 vertices."""
-    return _recovery("Stanford dragon", standing_vertices(fine=True))
+    return _recovery("Stanford dragon", standing_vertices(fine=True), seed=34)
 
 
-def _recovery(name: str, vertices: np.ndarray) -> Scene:
+def _recovery(name: str, vertices: np.ndarray, seed: int) -> Scene:
     body = build_two_scale_body(vertices)
     # Slow enough to be watched: at stiffness 1 the dragon has its shape after 50 steps.
     parameters = build_parameters(body, time_step=STEP_SECONDS, stiffness=0.05, damping=0.2)
-    scrambled = np.random.default_rng(0).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
+    scrambled = np.random.default_rng(seed).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
     return Scene(
         title=f"{name}: {len(vertices):,} scrambled vertices recover their shape",
         state=build_state(body, scrambled),
