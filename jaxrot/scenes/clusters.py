@@ -3,6 +3,8 @@
 Source: Müller et al. 2005, "Meshless deformations based on shape matching", section 4.4.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
@@ -25,8 +27,108 @@ def overlapping_clusters(vertices: np.ndarray, count: int, size: int) -> np.ndar
     seed = 0
     for row in range(count):
         distance = np.sum((vertices - vertices[seed]) ** 2, axis=1)
-        nearest = np.argpartition(distance, size - 1)[:size]
-        clusters[row] = nearest[np.argsort(distance[nearest], kind="stable")]
+        clusters[row] = _nearest_first(distance, size)
         distance_to_seeds = np.minimum(distance_to_seeds, distance)
         seed = int(np.argmax(distance_to_seeds))
     return clusters
+
+
+def covering_clusters(vertices: np.ndarray, count: int, size: int) -> np.ndarray:
+    """`overlapping_clusters`, and as many more as it takes to hold every vertex, each seeded at one that is in none.
+
+    Args:
+        vertices: Shape (n, 3).
+        count: Number of clusters to begin with; at most n.
+        size: Vertices in a cluster, at most n.
+
+    Returns:
+        Vertex indices of shape (at least count, size).
+    """
+    clusters = overlapping_clusters(vertices, count, size)
+    missing = np.ones(len(vertices), dtype=bool)
+    missing[clusters] = False
+    more = []
+    while missing.any():
+        distance = np.sum((vertices - vertices[np.argmax(missing)]) ** 2, axis=1)
+        more.append(_nearest_first(distance, size))
+        missing[more[-1]] = False
+    return np.concatenate([clusters, np.reshape(more, (-1, size)).astype(np.intp)])
+
+
+def spread_clusters(vertex_count: int, size: int) -> list[np.ndarray]:
+    """Clusters of vertices from all over the shape, every vertex in one of them.
+
+    Clusters of neighbours alone keep every place right and leave the whole folded: scrambled, the dragon's error is
+    still 12 % of its diagonal after 600 steps. With these it is below 0.1 % after 100. They also make the body stiffer:
+    a push is felt everywhere in the next step.
+
+    Args:
+        vertex_count: How many vertices there are.
+        size: Vertices in a cluster, at most; the sizes differ by one at most.
+
+    Returns:
+        Vertex indices of every cluster, drawn at random, always the same.
+    """
+    order = np.random.default_rng(0).permutation(vertex_count)
+    count = -(-vertex_count // size)
+    return [order[row::count] for row in range(count)]
+
+
+def padded(
+    clusters: Sequence[Sequence[int] | np.ndarray] | np.ndarray, vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Clusters of any lengths as one table.
+
+    Args:
+        clusters: Vertex indices of every cluster.
+        vertex_count: How many vertices there are.
+
+    Returns:
+        The indices, shape (c, s), 0 in empty places, and which places are filled, bool of the same shape.
+
+    Raises:
+        ValueError: No cluster, an empty one, or one with a vertex twice or out of range.
+    """
+    if not len(clusters):
+        raise ValueError("clusters must hold at least one cluster; got none")
+    size = max(len(cluster) for cluster in clusters)
+    members, filled = np.zeros((len(clusters), size), dtype=np.intp), np.zeros((len(clusters), size), dtype=bool)
+    for row, cluster in enumerate(clusters):
+        found = np.unique(np.asarray(cluster))
+        if not len(found) or len(found) < len(cluster) or found[0] < 0 or found[-1] >= vertex_count:
+            raise ValueError(f"a cluster must hold different vertices below {vertex_count}; cluster {row} does not")
+        members[row, : len(cluster)] = cluster
+        filled[row, : len(cluster)] = True
+    return members, filled
+
+
+def incidence(members: np.ndarray, filled: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The table the other way round: every place of every vertex, so that sums over clusters are gathers.
+
+    Args:
+        members: Shape (c, s).
+        filled: Which of its places are filled, shape (c, s).
+        vertex_count: How many vertices there are, n.
+
+    Returns:
+        Places as indices into the c·s of `members`, shape (n, k), c·s where a vertex has no more; and how many each
+        vertex has, shape (n,).
+
+    Raises:
+        ValueError: A vertex is in no cluster.
+    """
+    occupied = np.flatnonzero(filled.ravel())
+    vertex = members.ravel()[occupied]
+    counts = np.bincount(vertex, minlength=vertex_count)
+    if not counts.all():
+        raise ValueError(f"every vertex must be in a cluster; vertex {int(np.argmin(counts))} is in none")
+    order = np.argsort(vertex, kind="stable")
+    rank = np.arange(len(vertex)) - np.repeat(np.cumsum(counts) - counts, counts)
+    places = np.full((vertex_count, counts.max()), members.size, dtype=np.intp)
+    places[vertex[order], rank] = occupied[order]
+    return places, counts
+
+
+def _nearest_first(distance: np.ndarray, size: int) -> np.ndarray:
+    nearest = np.argpartition(distance, size - 1)[:size]
+    return nearest[np.argsort(distance[nearest], kind="stable")]

@@ -1,0 +1,115 @@
+"""Contact of points with a ground plane and axis-aligned boxes: positions are moved out, velocities answer."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxrot._scaling import safe_divide, safe_sqrt
+
+# Lower and upper corner, each of three numbers.
+Corners = Sequence[Sequence[float]] | np.ndarray
+
+
+class Contact(NamedTuple):
+    """What the points may touch, and how they answer.
+
+    Attributes:
+        ground_height: Of the ground, whose normal is the third axis, m, shape ().
+        box: Lower and upper corner of a box that the points stay in, m, shape (2, 3).
+        obstacle: Lower and upper corner of a box that they stay out of, m, shape (2, 3).
+        restitution: Part of the normal velocity that comes back, 0 to 1, shape ().
+        friction: Coulomb's coefficient, ≥ 0, shape ().
+    """
+
+    ground_height: jax.Array
+    box: jax.Array
+    obstacle: jax.Array
+    restitution: jax.Array
+    friction: jax.Array
+
+
+class Motion(NamedTuple):
+    """Points on the move: positions, m, and velocities, m/s, each of shape (n, 3)."""
+
+    positions: jax.Array
+    velocities: jax.Array
+
+
+def build_contact(
+    *,
+    ground_height: float = -np.inf,
+    box: Corners = ((-np.inf,) * 3, (np.inf,) * 3),
+    obstacle: Corners = ((np.inf,) * 3, (-np.inf,) * 3),
+    restitution: float = 0.0,
+    friction: float = 0.5,
+    dtype: type = np.float32,
+) -> Contact:
+    """What the points may touch; what is not given is nowhere.
+
+    Raises:
+        ValueError: A box without room, restitution outside 0 to 1, negative friction, or a NaN.
+    """
+    corners = np.asarray(box, dtype=np.float64)
+    if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
+        raise ValueError(f"box must be a lower and an upper corner, shape (2, 3); got {corners.tolist()}")
+    solid = np.asarray(obstacle, dtype=np.float64)
+    if solid.shape != (2, 3) or np.isnan(solid).any():
+        raise ValueError(f"obstacle must be a lower and an upper corner, shape (2, 3); got {solid.tolist()}")
+    if np.isnan(ground_height):
+        raise ValueError("ground_height must be a number; got nan")
+    if not 0 <= restitution <= 1:
+        raise ValueError(f"restitution must be from 0 to 1; got {restitution}")
+    if not (np.isfinite(friction) and friction >= 0):
+        raise ValueError(f"friction must be finite and >= 0; got {friction}")
+    return Contact(*(jnp.asarray(value, dtype) for value in (ground_height, corners, solid, restitution, friction)))
+
+
+def stand_on_ground(motion: Motion, contact: Contact) -> Motion:
+    """Points under the ground are put onto it."""
+    depth = jnp.maximum(contact.ground_height - motion.positions[:, 2], 0)
+    zero = jnp.zeros_like(depth)
+    return pushed_out(motion, jnp.stack([zero, zero, depth], axis=-1), contact)
+
+
+def stay_in_box(motion: Motion, contact: Contact) -> Motion:
+    """Points outside the box are put onto its nearest point."""
+    inside = jnp.clip(motion.positions, contact.box[:1], contact.box[1:])
+    return pushed_out(motion, inside - motion.positions, contact)
+
+
+def stay_out_of_obstacle(motion: Motion, contact: Contact) -> Motion:
+    """Points inside the obstacle leave it through its nearest face."""
+    to_lower, to_upper = motion.positions - contact.obstacle[:1], contact.obstacle[1:] - motion.positions
+    depth = jnp.minimum(to_lower, to_upper)
+    inside = (depth > 0).all(axis=-1, keepdims=True)
+    face = jnp.arange(3)[None] == jnp.argmin(depth, axis=-1, keepdims=True)
+    out = jnp.where(to_lower < to_upper, -depth, depth)
+    return pushed_out(motion, jnp.where(inside & face, out, jnp.zeros_like(out)), contact)
+
+
+def pushed_out(motion: Motion, displacements: jax.Array, contact: Contact) -> Motion:
+    """Points put onto the surface of what they went into; they go no further into it.
+
+    Args:
+        motion: The points.
+        displacements: The shortest way out, m, shape (n, 3); 0 for points that do not touch.
+        contact: How they answer.
+
+    Returns:
+        The points on the surface. A normal velocity inwards is reversed, times the restitution; the tangential one
+        loses the friction coefficient times the change of the normal one, and at most all of itself.
+    """
+    normals = safe_divide(displacements, jnp.broadcast_to(_lengths(displacements), displacements.shape))
+    normal_speeds = jnp.sum(motion.velocities * normals, axis=-1, keepdims=True)
+    changes = -(1 + contact.restitution) * jnp.minimum(normal_speeds, 0)
+    tangential = motion.velocities - normal_speeds * normals
+    speeds = _lengths(tangential)
+    lost = safe_divide(jnp.minimum(contact.friction * changes, speeds), speeds)
+    return Motion(motion.positions + displacements, motion.velocities + changes * normals - lost * tangential)
+
+
+def _lengths(vectors: jax.Array) -> jax.Array:
+    return safe_sqrt(jnp.sum(vectors**2, axis=-1, keepdims=True))

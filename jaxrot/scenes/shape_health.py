@@ -1,0 +1,59 @@
+"""What is watched while a body of clusters moves."""
+
+import jax
+import jax.numpy as jnp
+
+from jaxrot import nearest_rotation, rotation_gap
+from jaxrot._scaling import safe_divide
+from jaxrot.scenes.balance import cross
+from jaxrot.scenes.shape_matching import Parameters, State, fit_clusters, turned_offsets
+
+
+def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
+    """Energies, momenta, how well the rotations are determined and kept, and the distance from the shape at rest.
+
+    Args:
+        state: Now.
+        parameters: Of the same dtype.
+
+    Returns:
+        Scalars by name. The elastic energy is α/(2h²) Σ m |g − x|², whose gradient the pull towards the goals is; the
+        angular momentum is about the centre of mass.
+    """
+    body = parameters.body
+    masses = body.masses[:, None]
+    total = jnp.sum(masses)
+    momentum = jnp.sum(masses * state.velocities, axis=0)
+    centre = jnp.sum(masses * state.positions, axis=0) / total
+    arms, relative = state.positions - centre[None], state.velocities - (momentum / total)[None]
+    fit = fit_clusters(state.positions, body)
+    away = jnp.sum((turned_offsets(state.rotations, body) - fit.arms) ** 2, axis=-1)
+    part = body.masses / body.cluster_counts
+    elastic = jnp.sum(jnp.where(body.shares > 0, part[body.members], jnp.zeros_like(body.shares)) * away)
+    gram = jnp.sum(state.rotations[..., :, :, None] * state.rotations[..., :, None, :], axis=-3)
+    defect = gram - jnp.eye(3, dtype=gram.dtype)[None]
+    return {
+        "kinetic energy (J)": 0.5 * jnp.sum(masses * state.velocities**2),
+        "elastic energy (J)": 0.5 * parameters.stiffness / parameters.time_step**2 * elastic,
+        "linear momentum (kg m/s)": _length(momentum),
+        "angular momentum (kg m²/s)": _length(jnp.sum(masses * cross(arms, relative), axis=0)),
+        "smallest rotation gap": jnp.min(rotation_gap(fit.matrices)),
+        "worst orthogonality": jnp.max(jnp.sqrt(jnp.sum(defect**2, axis=(-2, -1)))),
+        "shape error (of the diagonal)": shape_error(state.positions, body.rest_positions),
+    }
+
+
+def shape_error(positions: jax.Array, rest_positions: jax.Array) -> jax.Array:
+    """The RMS distance from the shape at rest, moved and turned onto it, over the diagonal of its bounding box."""
+    x = positions - jnp.mean(positions, axis=0, keepdims=True)
+    q = rest_positions - jnp.mean(rest_positions, axis=0, keepdims=True)
+    rotation = nearest_rotation(jnp.sum(x[:, :, None] * q[:, None, :], axis=0))
+    turned = jnp.sum(rotation[None] * q[:, None, :], axis=-1)
+    diagonal = jnp.sqrt(jnp.sum((jnp.max(q, axis=0) - jnp.min(q, axis=0)) ** 2))
+    return jnp.sqrt(jnp.mean(jnp.sum((x - turned) ** 2, axis=-1))) / diagonal
+
+
+def _length(vector: jax.Array) -> jax.Array:
+    # Squares of a momentum overflow long before the momentum does.
+    largest = jnp.max(jnp.abs(vector))
+    return largest * jnp.sqrt(jnp.sum(safe_divide(vector, jnp.broadcast_to(largest, vector.shape)) ** 2))
