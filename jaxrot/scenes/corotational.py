@@ -10,14 +10,16 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.typing import ArrayLike
 
 from jaxrot import METHODS, STEPS
-from jaxrot.scenes import elasticity, tetrahedra
+from jaxrot.scenes import elasticity
+from jaxrot.scenes import tetrahedra as meshes
 from jaxrot.scenes.elasticity import Elements
 from jaxrot.scenes.newton import Choices, Problem, minimise
 
 INTEGRATORS = ("euler", "midpoint")
-TANGENTS = ("exact", "held")
+TANGENTS = ("exact", "held", "projected")
 
 
 class State(NamedTuple):
@@ -56,7 +58,7 @@ class Parameters(NamedTuple):
 
 def build(
     vertices: np.ndarray,
-    tetrahedra_: np.ndarray,
+    tetrahedra: np.ndarray,
     *,
     young: float | np.ndarray,
     poisson: float = 0.3,
@@ -71,7 +73,7 @@ def build(
 
     Args:
         vertices: At rest, shape (n, 3), m.
-        tetrahedra_: Vertex indices, shape (m, 4), of either orientation.
+        tetrahedra: Vertex indices, shape (m, 4), of either orientation.
         young: Young's modulus, a number or shape (m,), Pa.
         poisson: Poisson's ratio, above -1 and below 1/2.
         density: kg/m³.
@@ -84,7 +86,7 @@ def build(
     Raises:
         ValueError: An unusable mesh, a parameter that is not finite or has the wrong sign.
     """
-    mesh = tetrahedra.checked(vertices, tetrahedra_)
+    mesh = meshes.checked(vertices, tetrahedra)
     _check_positive("young", young)
     _check_positive("density", density)
     _check_positive("time_step", time_step)
@@ -99,25 +101,25 @@ def build(
         raise ValueError(f"fixed must be bool of shape ({len(mesh.vertices)},); got {held.dtype} of {held.shape}")
 
     count = len(mesh.tetrahedra)
-    modulus = np.broadcast_to(np.asarray(young, np.float64), (count,))
-    shear_modulus, lame_first = elasticity.lame_parameters(modulus, poisson)
 
-    def array(values: np.ndarray | float) -> jax.Array:
+    def array(values: ArrayLike) -> jax.Array:
         return jnp.asarray(values, dtype)
 
+    modulus = array(np.broadcast_to(young, (count,)))
+    shear_modulus, lame_first = elasticity.lame_parameters(modulus, array(poisson))
     elements = Elements(
         corners=jnp.asarray(mesh.tetrahedra),
-        incidence=jnp.asarray(tetrahedra.incidence(mesh)),
-        rest_inverses=array(np.linalg.inv(tetrahedra.edge_matrices(mesh))),
-        volumes=array(tetrahedra.volumes(mesh)),
-        shear_modulus=array(shear_modulus),
-        lame_first=array(lame_first),
+        incidence=jnp.asarray(meshes.incidence(mesh)),
+        rest_inverses=array(np.linalg.inv(meshes.edge_matrices(mesh))),
+        volumes=array(meshes.volumes(mesh)),
+        shear_modulus=shear_modulus,
+        lame_first=lame_first,
     )
     parameters = Parameters(
         elements=elements,
-        masses=array(tetrahedra.lumped_masses(mesh, density)),
+        masses=array(meshes.lumped_masses(mesh, density)),
         free=array(~held),
-        gravity=array(gravity),
+        gravity=array(np.asarray(gravity)),
         damping=array(damping),
         time_step=array(time_step),
     )
@@ -151,8 +153,8 @@ def step(
         rotation: A name in `jaxrot.STEPS`, or, if `iterations` is None, in `jaxrot.METHODS`.
         iterations: Steps of `rotation` from the rotation in the state, at every evaluation of the force. 0 keeps the
             state's rotations, linear elasticity from the identity. None: a cold start.
-        tangent: "held" takes the rotations for constant. "exact" has their derivative, projected to be positive
-            semidefinite: a product costs about twice as much, and Newton's method needs fewer iterations.
+        tangent: "held" takes the rotations for constant. "exact" has their derivative: Newton's method is quadratic
+            near a stable equilibrium. "projected" is the same made positive semidefinite, for large deformations.
         newton_iterations: At least 1.
         line_search: How many times the Newton step may be halved until the potential does not increase.
         conjugate_gradients: The most iterations of a linear solve.
@@ -198,7 +200,7 @@ def _check_choices(integrator: str, choices: Choices) -> None:
     if choices.rotation not in registry:
         kind = "method" if choices.iterations is None else "step"
         raise ValueError(f"rotation must be a {kind}, one of {', '.join(sorted(registry))}; got {choices.rotation!r}")
-    if choices.iterations == 0 and choices.tangent == "exact":
+    if choices.iterations == 0 and choices.tangent != "held":
         raise ValueError("tangent must be 'held' where iterations is 0: such rotations have no derivative")
     if choices.newton_iterations < 1 or choices.conjugate_gradients < 1 or choices.line_search < 0:
         raise ValueError("newton_iterations and conjugate_gradients must be >= 1, line_search >= 0")

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, twist_modes
 
@@ -38,8 +39,9 @@ class Elements(NamedTuple):
     lame_first: jax.Array
 
 
-def lame_parameters(young: jax.Array, poisson: jax.Array | float) -> tuple[jax.Array, jax.Array]:
+def lame_parameters(young: ArrayLike, poisson: ArrayLike) -> tuple[jax.Array, jax.Array]:
     """(μ, λ) from Young's modulus, Pa, and Poisson's ratio."""
+    young, poisson = jnp.asarray(young), jnp.asarray(poisson)
     return young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
 
 
@@ -110,12 +112,20 @@ def held_tangent(rotations: jax.Array, elements: Elements) -> Callable[[jax.Arra
     return product
 
 
-def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> Callable[[jax.Array], jax.Array]:
-    """Ḟ to Ṗ with R's derivative, projected to be positive semidefinite.
+def exact_tangent(
+    gradients: jax.Array, rotations: jax.Array, elements: Elements, *, project: bool
+) -> Callable[[jax.Array], jax.Array]:
+    """Ḟ to Ṗ with R's derivative.
 
     R turns in three twist modes T only, Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ), in which `held_tangent` has no stiffness. The exact
-    one is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ): the geometric stiffness of a stretched element. In compression it is
-    negative, and 0 is taken: conjugate gradients would not descend.
+    one is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ): the geometric stiffness, negative in compression.
+
+    Args:
+        gradients: F, shape (m, 3, 3).
+        rotations: R, converged, shape (m, 3, 3).
+        elements: The elements.
+        project: Take 0 where it is negative, so that the tangent is positive semidefinite and conjugate gradients
+            descend from anywhere. Without, Newton's method is quadratic near a stable equilibrium.
 
     Source: Smith, de Goes and Kim 2019, section 4.
     """
@@ -123,7 +133,9 @@ def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements
     eigenvalues, modes = twist_modes(gradients)
     shear = 2 * elements.shear_modulus
     turning = shear - elements.lame_first * _trace(_strain(gradients, rotations))
-    stiffness = jnp.maximum(shear[:, None] - turning[:, None] * eigenvalues, 0)
+    stiffness = shear[:, None] - turning[:, None] * eigenvalues
+    if project:
+        stiffness = jnp.maximum(stiffness, 0)
 
     def product(gradients_dot: jax.Array) -> jax.Array:
         twist = stiffness * jnp.sum(modes * gradients_dot[:, None], axis=(-2, -1))

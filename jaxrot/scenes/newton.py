@@ -72,10 +72,11 @@ def _newton_iteration(
     gradients = elasticity.deformation_gradients(problem.start + displacement, elements)
     rotations = _rotations(gradients, rotations, choices)
     stress = elasticity.stress(gradients, rotations, elements)
-    if choices.tangent == "exact":
-        tangent = elasticity.exact_tangent(gradients, rotations, elements)
-    else:
+    if choices.tangent == "held":
         tangent = elasticity.held_tangent(rotations, elements)
+    else:
+        project = choices.tangent == "projected"
+        tangent = elasticity.exact_tangent(gradients, rotations, elements, project=project)
 
     def stiffness(direction: jax.Array) -> jax.Array:
         stress_dot = tangent(elasticity.deformation_gradients(direction, elements))
