@@ -90,7 +90,7 @@ def build(
     _check_positive("young", young)
     _check_positive("density", density)
     _check_positive("time_step", time_step)
-    if not -1 < poisson < 0.5:
+    if not -1 < np.dtype(dtype).type(poisson) < 0.5:
         raise ValueError(f"poisson must be above -1 and below 1/2; got {poisson}")
     if not (np.isfinite(damping) and damping >= 0):
         raise ValueError(f"damping must be finite and >= 0; got {damping}")
@@ -169,21 +169,29 @@ def step(
     # The midpoint of the step is a step of implicit Euler half as long, from where the second half mirrors the first.
     midpoint = integrator == "midpoint"
     seconds = 0.5 * parameters.time_step if midpoint else parameters.time_step
+    problem = euler_problem(state, parameters, seconds, gravity=gravity)
+    displacement, rotations = minimise(problem, state.rotations, choices)
+    velocities = displacement / seconds
+    if midpoint:
+        displacement, velocities = 2 * displacement, 2 * velocities - state.velocities
+    return State(state.positions + displacement, velocities, rotations)
+
+
+def euler_problem(state: State, parameters: Parameters, seconds: jax.Array, *, gravity: bool = True) -> Problem:
+    """The potential whose minimum is a step of implicit Euler; for `newton.minimise` and `newton.residuals`.
+
+    Source: Gast et al. 2015.
+    """
     push = state.velocities / seconds
     if gravity:
         push = push + jnp.broadcast_to(parameters.gravity, push.shape)
-    problem = Problem(
+    return Problem(
         elements=parameters.elements,
         start=state.positions,
         inertia=parameters.masses * ((1 + parameters.damping * seconds) / seconds**2),
         load=parameters.masses[:, None] * push,
         free=parameters.free,
     )
-    displacement, rotations = minimise(problem, state.rotations, choices)
-    velocities = displacement / seconds
-    if midpoint:
-        displacement, velocities = 2 * displacement, 2 * velocities - state.velocities
-    return State(state.positions + displacement, velocities, rotations)
 
 
 def _check_positive(name: str, value: float | np.ndarray) -> None:

@@ -13,15 +13,15 @@ from jaxrot.scenes.elasticity import Elements
 
 
 class Choices(NamedTuple):
-    """Static choices, those of `corotational.step`."""
+    """How a step is solved; static. What each means: `corotational.step`."""
 
-    rotation: str
-    iterations: int | None
-    tangent: str
-    newton_iterations: int
-    line_search: int
-    conjugate_gradients: int
-    tolerance: float
+    rotation: str = "torque"
+    iterations: int | None = 3
+    tangent: str = "held"
+    newton_iterations: int = 1
+    line_search: int = 0
+    conjugate_gradients: int = 100
+    tolerance: float = 1e-5
 
 
 class Problem(NamedTuple):
@@ -46,7 +46,7 @@ def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[
     """The displacement after a fixed number of Newton iterations from 0, and the rotations at the last of them."""
 
     def iteration(_: int, carry: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        return _newton_iteration(problem, *carry, choices)
+        return _newton_iteration(problem, *carry, choices)[:2]
 
     carry = (jnp.zeros_like(problem.start), rotations)
     if choices.newton_iterations == 1:
@@ -54,24 +54,24 @@ def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[
     return lax.fori_loop(0, choices.newton_iterations, iteration, carry)
 
 
-def residual(problem: Problem, displacement: jax.Array, rotations: jax.Array) -> jax.Array:
-    """The gradient of the potential where vertices are free, shape (n, 3), N."""
-    gradients = elasticity.deformation_gradients(problem.start + displacement, problem.elements)
-    return _residual(problem, displacement, elasticity.stress(gradients, rotations, problem.elements))
+def residuals(problem: Problem, rotations: jax.Array, choices: Choices) -> jax.Array:
+    """The norm of the gradient of the potential before each of the iterations, shape (newton_iterations,), N."""
 
+    def iteration(carry: tuple[jax.Array, jax.Array], _: None) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
+        displacement, rotations, force = _newton_iteration(problem, *carry, choices)
+        return (displacement, rotations), jnp.sqrt(jnp.sum(force**2))
 
-def _residual(problem: Problem, displacement: jax.Array, stress: jax.Array) -> jax.Array:
-    internal = elasticity.nodal_gradient(stress, problem.elements)
-    return problem.free[:, None] * (problem.inertia[:, None] * displacement - problem.load + internal)
+    carry = (jnp.zeros_like(problem.start), rotations)
+    return lax.scan(iteration, carry, length=choices.newton_iterations)[1]
 
 
 def _newton_iteration(
     problem: Problem, displacement: jax.Array, rotations: jax.Array, choices: Choices
-) -> tuple[jax.Array, jax.Array]:
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """The next displacement; the rotations and the force at the present one."""
     elements = problem.elements
     gradients = elasticity.deformation_gradients(problem.start + displacement, elements)
     rotations = _rotations(gradients, rotations, choices)
-    stress = elasticity.stress(gradients, rotations, elements)
     if choices.tangent == "held":
         tangent = elasticity.held_tangent(rotations, elements)
     else:
@@ -82,10 +82,12 @@ def _newton_iteration(
         stress_dot = tangent(elasticity.deformation_gradients(direction, elements))
         return problem.inertia[:, None] * direction + elasticity.nodal_gradient(stress_dot, elements)
 
-    change = _solve(stiffness, -_residual(problem, displacement, stress), problem, choices)
+    internal = elasticity.nodal_gradient(elasticity.stress(gradients, rotations, elements), elements)
+    force = problem.free[:, None] * (problem.load - problem.inertia[:, None] * displacement - internal)
+    change = _solve(stiffness, force, problem, choices)
     if choices.line_search:
         change = change * _step_length(problem, displacement, change, rotations, choices)
-    return displacement + change, rotations
+    return displacement + change, rotations, force
 
 
 def _rotations(gradients: jax.Array, rotations: jax.Array, choices: Choices) -> jax.Array:
