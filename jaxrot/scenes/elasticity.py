@@ -112,20 +112,41 @@ def held_tangent(rotations: jax.Array, elements: Elements) -> Callable[[jax.Arra
     return product
 
 
-def exact_tangent(
-    gradients: jax.Array, rotations: jax.Array, elements: Elements, *, project: bool
-) -> Callable[[jax.Array], jax.Array]:
-    """Ḟ to Ṗ with R's derivative.
+def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> Callable[[jax.Array], jax.Array]:
+    """Ḟ to Ṗ with R's derivative: 2 μ (Ḟ − Ṙ) + λ ((R:Ḟ) R + (tr S − 3) Ṙ).
 
-    R turns in three twist modes T only, Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ), in which `held_tangent` has no stiffness. The exact
-    one is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ): the geometric stiffness, negative in compression.
+    Newton's method is quadratic with it near a stable equilibrium. In compression it has negative eigenvalues.
 
     Args:
         gradients: F, shape (m, 3, 3).
         rotations: R, converged, shape (m, 3, 3).
         elements: The elements.
-        project: Take 0 where it is negative, so that the tangent is positive semidefinite and conjugate gradients
-            descend from anywhere. Without, Newton's method is quadratic near a stable equilibrium.
+    """
+    shear = 2 * elements.shear_modulus[:, None, None]
+    # Without iterations what is left is the rule of the derivative at R; linearised, its inverses are formed once.
+    _, turned = jax.linearize(lambda f: refine_rotation(f, rotations, iterations=0), gradients)
+    pressure = (elements.lame_first * _trace(_strain(gradients, rotations)))[:, None, None]
+
+    def product(gradients_dot: jax.Array) -> jax.Array:
+        rotations_dot = turned(gradients_dot)
+        trace = elements.lame_first * jnp.sum(rotations * gradients_dot, axis=(-2, -1))
+        return shear * gradients_dot + (pressure - shear) * rotations_dot + trace[:, None, None] * rotations
+
+    return product
+
+
+def projected_tangent(
+    gradients: jax.Array, rotations: jax.Array, elements: Elements
+) -> Callable[[jax.Array], jax.Array]:
+    """`exact_tangent` made positive semidefinite, for conjugate gradients to descend from anywhere.
+
+    R turns in three twist modes T only, Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ), in which `held_tangent` has no stiffness. The exact
+    one is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ): the geometric stiffness. Where it is negative, 0 is taken.
+
+    Args:
+        gradients: F, shape (m, 3, 3).
+        rotations: R, converged, shape (m, 3, 3).
+        elements: The elements.
 
     Source: Smith, de Goes and Kim 2019, section 4.
     """
@@ -133,9 +154,7 @@ def exact_tangent(
     eigenvalues, modes = twist_modes(gradients)
     shear = 2 * elements.shear_modulus
     turning = shear - elements.lame_first * _trace(_strain(gradients, rotations))
-    stiffness = shear[:, None] - turning[:, None] * eigenvalues
-    if project:
-        stiffness = jnp.maximum(stiffness, 0)
+    stiffness = jnp.maximum(shear[:, None] - turning[:, None] * eigenvalues, 0)
 
     def product(gradients_dot: jax.Array) -> jax.Array:
         twist = stiffness * jnp.sum(modes * gradients_dot[:, None], axis=(-2, -1))

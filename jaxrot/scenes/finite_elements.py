@@ -68,7 +68,6 @@ def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
         parameters=parameters,
         rotation="newton",
         iterations=1,
-        tangent="projected",
         tolerance=1e-3,
     )
     return _scene("Cantilever of co-rotational finite elements", body, state, parameters, step, steps=150)

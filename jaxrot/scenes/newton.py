@@ -74,9 +74,10 @@ def _newton_iteration(
     rotations = _rotations(gradients, rotations, choices)
     if choices.tangent == "held":
         tangent = elasticity.held_tangent(rotations, elements)
+    elif choices.tangent == "exact":
+        tangent = elasticity.exact_tangent(gradients, rotations, elements)
     else:
-        project = choices.tangent == "projected"
-        tangent = elasticity.exact_tangent(gradients, rotations, elements, project=project)
+        tangent = elasticity.projected_tangent(gradients, rotations, elements)
 
     def stiffness(direction: jax.Array) -> jax.Array:
         stress_dot = tangent(elasticity.deformation_gradients(direction, elements))
