@@ -32,9 +32,9 @@ def rollout(length, **choices):
 
 
 def settle(state, parameters):
-    """The equilibrium, by thirty Newton iterations of one step each."""
-    choices = {"rotation": "newton", "tangent": "held", "conjugate_gradients": 300, "tolerance": 1e-10}
-    return rollout(30, **choices)(state, parameters)[0]
+    """The equilibrium, by twenty Newton iterations of one step each."""
+    choices = {"rotation": "torque_exact_angle", "conjugate_gradients": 300, "tolerance": 1e-10}
+    return rollout(20, **choices)(state, parameters)[0]
 
 
 def turn(angle):
@@ -50,7 +50,7 @@ def gradients_of(state, parameters):
 def test_the_patch_test_far_turned():
     inside = ((BLOCK.vertices > 0) & (BLOCK.vertices < 1)).all(axis=1)
     state, parameters = build(*BLOCK, young=1e6, time_step=STATIC, gravity=NO_GRAVITY, fixed=~inside, dtype="float64")
-    deformation = turn(2.0) @ (np.eye(3) + [[0.1, 0.05, 0], [0, -0.05, 0.1], [0, 0, 0.02]])
+    deformation = turn(2.0) @ np.array([[1.1, 0.05, 0], [0, 0.95, 0.1], [0, 0, 1.02]])
     exact = BLOCK.vertices @ deformation.T
     noise = np.random.default_rng(0).normal(size=exact.shape) * 0.1
     start = state._replace(positions=jnp.asarray(exact + inside[:, None] * noise))
@@ -80,11 +80,11 @@ def test_a_rigid_motion_makes_no_ghost_force():
 
 
 def test_a_cantilever_bends_as_euler_and_bernoulli_say():
-    length, load = 10.0, 1e-3
+    length, load = 8.0, 1e-3
     deflections = []
     for refinement in (1, 2):
-        cells = (60 * refinement, 1, 5 * refinement)
-        mesh = box(cells, (length, 0.1, 1.0))
+        cells = (48 * refinement, 1, 4 * refinement)
+        mesh = box(cells, (length, 0.125, 1.0))
         state, parameters = build(
             *mesh,
             young=1e7,
@@ -95,20 +95,20 @@ def test_a_cantilever_bends_as_euler_and_bernoulli_say():
             fixed=mesh.vertices[:, 0] == 0,
             dtype="float64",
         )
-        run = rollout(1, conjugate_gradients=10_000, tolerance=1e-6)
+        run = rollout(1, conjugate_gradients=10_000, tolerance=1e-5)
         tip = mesh.vertices[:, 0] == length
         deflections.append(-float((run(state, parameters)[0].positions - state.positions)[tip, 2].mean()))
     coarse, fine = np.array(deflections) / (load * length**4 / (8 * 1e7 / 12))
     assert abs(fine - 1) < 0.03
-    # Linear tetrahedra are too stiff in bending by a multiple of the cell's square; Timoshenko's shear adds 0.8 %.
-    assert abs(fine + (fine - coarse) / 3 - 1.008) < 0.01
+    # Linear tetrahedra are too stiff in bending by a multiple of the cell's square; Timoshenko's shear adds 1.25 %.
+    assert abs(fine + (fine - coarse) / 3 - 1.0125) < 0.01
 
 
 def test_the_midpoint_rule_keeps_the_energy_and_the_momenta():
     state, parameters = build(*BLOCK, young=1e5, gravity=NO_GRAVITY, dtype="float64")
     spin = np.random.default_rng(0).normal(size=(3, 3))
     state = state._replace(velocities=state.positions @ jnp.asarray(spin))
-    choices = {"rotation": "newton", "gravity": False, "newton_iterations": 4, "tolerance": 1e-6}
+    choices = {"rotation": "torque_exact_angle", "gravity": False, "newton_iterations": 4, "tolerance": 1e-6}
     masses = parameters.masses[:, None]
 
     def watched(state):
@@ -119,17 +119,13 @@ def test_the_midpoint_rule_keeps_the_energy_and_the_momenta():
         spin = jnp.sum(masses * jnp.cross(state.positions, state.velocities), axis=0)
         return energy + 0.5 * jnp.sum(masses * state.velocities**2), momentum, spin
 
-    energy, momentum, spin = watched(state)
-    drift = {}
-    for integrator in ("midpoint", "euler"):
-        _, states = rollout(600, integrator=integrator, **choices)(state, parameters)
-        energies, momenta, spins = jax.jit(jax.vmap(watched))(states)
-        drift[integrator] = np.asarray(energies / energy - 1)
-        assert np.abs(momenta - np.asarray(momentum)).max() < 1e-10 * np.abs(momentum).max()
-    assert np.abs(spins - np.asarray(spin)).max() >= 0
-    assert np.abs(drift["midpoint"]).max() < 2e-3
-    assert np.abs(drift["midpoint"][300:]).max() < 1.5 * np.abs(drift["midpoint"][:300]).max(), "it grows"
-    assert drift["euler"][-1] < -0.01
+    _, states = rollout(600, integrator="midpoint", **choices)(state, parameters)
+    states = jax.tree.map(lambda first, later: jnp.concatenate([first[None], later]), state, states)
+    energies, momenta, spins = (np.asarray(values) for values in jax.jit(jax.vmap(watched))(states))
+    drift = np.abs(energies / energies[0] - 1)
+    assert drift.max() < 2e-3
+    assert np.abs(momenta - momenta[0]).max() < 1e-9 * np.abs(momenta).max()
+    assert np.abs(spins - spins[0]).max() < 1e-6 * np.abs(spins).max()
 
 
 def test_steel_is_stable_at_a_sixtieth_of_a_second():
@@ -140,7 +136,7 @@ def test_steel_is_stable_at_a_sixtieth_of_a_second():
     state = state._replace(velocities=jnp.asarray(kick * ~fixed[:, None], jnp.float32))
     last, states = rollout(200)(state, parameters)
     # At 10 m/s a vertex would go 0.17 m in one step.
-    assert np.abs(states.positions - np.asarray(state.positions)).max() < 1e-3
+    assert np.abs(np.asarray(states.positions) - np.asarray(state.positions)).max() < 1e-3
     assert np.abs(last.velocities).max() < 1e-3
 
 
@@ -177,36 +173,29 @@ def test_a_block_recovers_its_shape_with_every_element_upright(start):
 @functools.cache
 def random_elements():
     """A few hundred deformation gradients, a third of them inverted, and all that is computed at them."""
-    state, parameters = build(*BLOCK, young=1.0, poisson=0.3, dtype="float64")
+    _, parameters = build(*BLOCK, young=1.0, poisson=0.3, dtype="float64")
     elements = parameters.elements
     rng = np.random.default_rng(0)
     gradients = jnp.asarray(rng.normal(size=(len(BLOCK.tetrahedra), 3, 3)))
     directions = jnp.broadcast_to(jnp.eye(9).reshape(9, 1, 3, 3), (9, *gradients.shape))
 
     def rotations_of(gradients):
-        start = jnp.broadcast_to(jnp.eye(3), gradients.shape)
-        return refine_rotation(gradients, start, step="newton", iterations=12, escape=True)
+        return refine_rotation(gradients, jnp.eye(3), step="newton", iterations=16)
 
     def computed(gradients):
-        def stress(gradients):
-            return elasticity.stress(gradients, rotations_of(gradients), elements)
-
         def energy(gradients):
             return elasticity.energy(gradients, rotations_of(gradients), elements)
 
         rotations = rotations_of(gradients)
-        by_jvp = jax.vmap(lambda direction: jax.jvp(stress, (gradients,), (direction,))[1])(directions)
-        exact, projected = (
-            jax.vmap(elasticity.exact_tangent(gradients, rotations, elements, project=project))(directions)
-            for project in (False, True)
-        )
+        stress = elasticity.stress(gradients, rotations, elements)
+        exact = jax.vmap(elasticity.exact_tangent(gradients, rotations, elements))(directions)
+        projected = jax.vmap(elasticity.projected_tangent(gradients, rotations, elements))(directions)
         held = jax.vmap(elasticity.held_tangent(rotations, elements))(directions)
-        return stress(gradients), jax.grad(energy)(gradients), by_jvp, exact, projected, held
+        return stress, jax.grad(energy)(gradients), exact, projected, held
 
-    results = jax.jit(computed)(gradients)
-    volumes = np.asarray(elements.volumes)[:, None, None]
-    dense = [np.asarray(tangent).reshape(9, -1, 9).swapaxes(0, 1) for tangent in results[2:]]
-    return np.asarray(results[0]), np.asarray(results[1]) / volumes, *dense
+    stress, of_energy, *tangents = jax.jit(computed)(gradients)
+    dense = [np.asarray(tangent).reshape(9, -1, 9).swapaxes(0, 1) for tangent in tangents]
+    return np.asarray(stress), np.asarray(of_energy) / np.asarray(elements.volumes)[:, None, None], *dense
 
 
 def test_the_force_with_rotations_held_is_the_derivative_of_the_energy():
@@ -214,14 +203,9 @@ def test_the_force_with_rotations_held_is_the_derivative_of_the_energy():
     np.testing.assert_allclose(stress, of_energy, atol=1e-9 * np.abs(stress).max())
 
 
-def test_the_exact_tangent_is_the_derivative_of_the_force():
-    _, _, by_jvp, exact, *_ = random_elements()
-    size = np.abs(by_jvp).max(axis=(1, 2), keepdims=True)
-    assert (np.abs(exact - by_jvp) / size).max() < 1e-6
-
-
-def test_the_projected_tangent_has_the_negative_eigenvalues_set_to_zero():
-    *_, exact, projected, held = random_elements()
+def test_the_projected_tangent_is_the_exact_one_without_its_negative_eigenvalues():
+    _, _, exact, projected, held = random_elements()
+    np.testing.assert_allclose(exact, exact.swapaxes(1, 2), atol=1e-8 * np.abs(exact).max())
     values, vectors = np.linalg.eigh(0.5 * (exact + exact.swapaxes(1, 2)))
     clipped = (vectors * np.maximum(values, 0)[:, None]) @ vectors.swapaxes(1, 2)
     assert (values < -0.1).any()
@@ -237,7 +221,7 @@ def test_newton_needs_fewer_iterations_with_the_exact_tangent():
     problem = corotational.euler_problem(state, parameters, parameters.time_step)
     needed = {}
     for tangent in ("exact", "held"):
-        choices = newton.Choices("newton", 8, tangent, 16, conjugate_gradients=500, tolerance=1e-10)
+        choices = newton.Choices("torque_exact_angle", 16, tangent, 14, conjugate_gradients=500, tolerance=1e-10)
         norms = jax.jit(newton.residuals, static_argnums=2)(problem, state.rotations, choices)
         needed[tangent] = int(np.argmax(np.asarray(norms) < 1e-9 * norms[0]))
     assert 0 < needed["exact"] <= 6
@@ -249,29 +233,32 @@ def test_a_rollout_is_differentiable_and_finds_the_stiffness_of_a_final_shape():
     fixed = mesh.vertices[:, 0] == 0
     state, parameters = build(*mesh, young=1e6, poisson=0.3, time_step=1 / 30, fixed=fixed, dtype="float64")
 
-    def final_shape(log_young):
-        shear_modulus, lame_first = elasticity.lame_parameters(jnp.exp(log_young), 0.3)
+    def final_shape(compliance):
+        shear_modulus, lame_first = elasticity.lame_parameters(1e6 / compliance, 0.3)
         count = (len(mesh.tetrahedra),)
         stiffness = {
             "shear_modulus": jnp.broadcast_to(shear_modulus, count),
             "lame_first": jnp.broadcast_to(lame_first, count),
         }
-        stiffer = parameters._replace(elements=parameters.elements._replace(**stiffness))
-        return rollout(10, rotation="newton", tolerance=1e-10)(state, stiffer)[0].positions
+        other = parameters._replace(elements=parameters.elements._replace(**stiffness))
+        return rollout(8, rotation="torque_exact_angle", tolerance=1e-10)(state, other)[0].positions
 
-    target = final_shape(jnp.log(2e5))
-    loss = jax.jit(jax.value_and_grad(lambda log_young: jnp.sum((final_shape(log_young) - target) ** 2)))
+    def compared(compliance, target):
+        shape = final_shape(compliance)
+        return jnp.sum((shape - target) ** 2), shape
+
+    loss = jax.jit(jax.value_and_grad(compared, has_aux=True))
+    (_, target), _ = loss(5.0, state.positions)
     # The secant method on the derivative, from a beam five times as stiff.
-    before, now = np.log(1e6), np.log(0.9e6)
-    slope_before = float(loss(before)[1])
-    difference = float(loss(before)[0] - loss(now)[0])
-    assert difference == pytest.approx(0.5 * (slope_before + float(loss(now)[1])) * (before - now), rel=1e-3)
+    before, now = 1.0, 1.1
+    ((loss_before, _), slope_before), ((loss_now, _), slope) = loss(before, target), loss(now, target)
+    assert float(loss_now - loss_before) == pytest.approx(0.5 * float(slope_before + slope) * (now - before), rel=1e-2)
     for _ in range(12):
-        slope = float(loss(now)[1])
-        if abs(slope) < 1e-12:
+        before, now = now, now - float(slope * (now - before) / (slope - slope_before))
+        slope_before, ((value, _), slope) = slope, loss(now, target)
+        if value < 1e-16:
             break
-        before, now, slope_before = now, now - slope * (now - before) / (slope - slope_before), slope
-    assert np.exp(now) == pytest.approx(2e5, rel=1e-4)
+    assert now == pytest.approx(5.0, rel=1e-4)
 
 
 def test_static_choices_leave_out_what_they_switch_off():
@@ -282,9 +269,8 @@ def test_static_choices_leave_out_what_they_switch_off():
 
     linear = counted(iterations=0)
     assert counted(iterations=0, gravity=False) < linear
-    assert counted(iterations=0, line_search=2) > linear
     assert counted(iterations=1) > linear
     gradients = state.rotations
     held = flops(lambda d: elasticity.held_tangent(gradients, parameters.elements)(d), gradients)
-    exact = flops(lambda d: elasticity.exact_tangent(gradients, d, parameters.elements, project=False)(d), gradients)
+    exact = flops(lambda d: elasticity.exact_tangent(gradients, gradients, parameters.elements)(d), gradients)
     assert held < exact
