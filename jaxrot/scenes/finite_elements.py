@@ -1,0 +1,128 @@
+"""The scenes of co-rotational finite elements, and what is watched in them."""
+
+import functools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxrot import signed_singular_values
+from jaxrot.scenes import corotational, tetrahedra
+from jaxrot.scenes.corotational import Parameters, State
+from jaxrot.scenes.elasticity import deformation_gradients
+from jaxrot.scenes.scene import Scene
+
+_DENSITY = 1000.0
+_GRAVITY = 9.81
+
+
+def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
+    """Energies, the linear momentum of a body that is free, and the worst element's numbers."""
+    elements = parameters.elements
+    s = signed_singular_values(deformation_gradients(state.positions, elements))
+    shear = elements.shear_modulus * jnp.sum((s - 1) ** 2, axis=-1)
+    density = shear + 0.5 * elements.lame_first * (jnp.sum(s, axis=-1) - 3) ** 2
+    squares = jnp.sum(state.velocities**2, axis=-1)
+    # Of an element with all vertices at one point nothing is determined.
+    gap = jnp.where(s[:, 0] > 0, (s[:, 1] + s[:, 2]) / jnp.where(s[:, 0] > 0, s[:, 0], jnp.ones_like(s[:, 0])), 0)
+    columns = state.rotations[:, :, :, None] * state.rotations[:, :, None, :]
+    defect = jnp.sum(columns, axis=1) - jnp.broadcast_to(jnp.eye(3, dtype=s.dtype), state.rotations.shape)
+    momentum = jnp.sum(parameters.masses[:, None] * state.velocities, axis=0)
+    return {
+        "kinetic energy (J)": 0.5 * jnp.sum(parameters.masses * squares),
+        "elastic energy (J)": jnp.sum(elements.volumes * density),
+        "linear momentum (kg m/s)": jnp.sqrt(jnp.sum(momentum**2)),
+        "smallest rotation gap (1)": jnp.min(gap),
+        "worst orthogonality of R (1)": jnp.sqrt(jnp.max(jnp.sum(defect**2, axis=(-2, -1)))),
+        "inverted elements (1)": jnp.sum(s[:, 2] <= 0).astype(s.dtype),
+    }
+
+
+def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
+    """A beam clamped at its lower end along the first axis, that its own weight bends far down.
+
+    Args:
+        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), bent instead; as stiff as makes a beam of these
+            lengths sag by about its length, at a time step that fits its size.
+
+    Raises:
+        ValueError: An unusable mesh.
+    """
+    body = tetrahedra.box((20, 3, 3), (2.0, 0.3, 0.3)) if mesh is None else tetrahedra.checked(*mesh)
+    lower, size = body.vertices.min(axis=0), np.ptp(body.vertices, axis=0)
+    length, height = size[0], size[2]
+    fixed = body.vertices[:, 0] <= lower[0] + 0.02 * length
+    time_step = 0.037 * (length / _GRAVITY) ** 0.5
+    state, parameters = corotational.build(
+        *body,
+        # Euler and Bernoulli's deflection would be 1.5 times the length.
+        young=_DENSITY * _GRAVITY * length**3 / height**2,
+        density=_DENSITY,
+        time_step=time_step,
+        damping=0.02 / time_step,
+        fixed=fixed,
+    )
+    step = functools.partial(
+        corotational.step,
+        parameters=parameters,
+        rotation="newton",
+        iterations=1,
+        tolerance=1e-3,
+    )
+    return _scene("Cantilever of co-rotational finite elements", body, state, parameters, step, steps=150)
+
+
+def recovery(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
+    """A free block whose vertices were thrown about at random, half of the elements inverted, recovers its shape.
+
+    Args:
+        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), instead of a cube of 1 m.
+
+    Raises:
+        ValueError: An unusable mesh.
+    """
+    body = tetrahedra.box((6, 6, 6), (1.0, 1.0, 1.0)) if mesh is None else tetrahedra.checked(*mesh)
+    lower, size = body.vertices.min(axis=0), np.ptp(body.vertices, axis=0)
+    young, time_step = 1e5, 1 / 60
+    state, parameters = corotational.build(
+        *body,
+        young=young,
+        # A sound wave crosses the body in some 10 steps, whatever its size.
+        density=young * (10 * time_step / size.max()) ** 2,
+        time_step=time_step,
+        damping=2.0,
+    )
+    scattered = lower + size * np.random.default_rng(0).uniform(-0.5, 1.5, body.vertices.shape)
+    state = state._replace(positions=jnp.asarray(scattered, state.positions.dtype))
+    step = functools.partial(
+        corotational.step, parameters=parameters, conjugate_gradients=30, tolerance=1e-3, gravity=False
+    )
+    return _scene("A scattered block recovers its shape", body, state, parameters, step, steps=160)
+
+
+def _scene(
+    title: str,
+    body: tetrahedra.Mesh,
+    state: State,
+    parameters: Parameters,
+    step: Callable[[State], State],
+    steps: int,
+) -> Scene:
+    clamped = bool((parameters.free == 0).any())
+
+    def watched(state: State) -> dict[str, jax.Array]:
+        values = health(state, parameters)
+        # A clamp takes up momentum: nothing is conserved.
+        return {name: value for name, value in values.items() if not (clamped and name.startswith("linear momentum"))}
+
+    return Scene(
+        title=title,
+        state=state,
+        step=step,
+        health=watched,
+        points=lambda state: state.positions,
+        lines=tetrahedra.surface_edges(body),
+        step_seconds=float(parameters.time_step),
+        steps=steps,
+    )

@@ -1,0 +1,139 @@
+"""The minimum of inertia and elastic energy by Newton's method, matrix-free conjugate gradients inside."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jax.scipy.sparse.linalg import cg
+
+from jaxrot.scenes import elasticity
+from jaxrot.scenes.elasticity import Elements
+
+
+class Choices(NamedTuple):
+    """How a step is solved; static. What each means: `corotational.step`."""
+
+    rotation: str = "torque"
+    iterations: int | None = 3
+    tangent: str = "held"
+    newton_iterations: int = 1
+    line_search: int = 0
+    conjugate_gradients: int = 100
+    tolerance: float = 1e-5
+
+
+class Problem(NamedTuple):
+    """The potential ½ Σ c |u|² − uᵀf + E(x + u) of a displacement u.
+
+    Attributes:
+        elements: What E is the energy of.
+        start: x, shape (n, 3), m.
+        inertia: c, shape (n,), kg/s².
+        load: f, shape (n, 3), N.
+        free: 1 for a vertex that moves, 0 for a fixed one, shape (n,).
+    """
+
+    elements: Elements
+    start: jax.Array
+    inertia: jax.Array
+    load: jax.Array
+    free: jax.Array
+
+
+def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[jax.Array, jax.Array]:
+    """The displacement after a fixed number of Newton iterations from 0, and the rotations at the last of them."""
+
+    def iteration(_: int, carry: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        return _newton_iteration(problem, *carry, choices)[:2]
+
+    carry = (jnp.zeros_like(problem.start), rotations)
+    if choices.newton_iterations == 1:
+        return iteration(0, carry)
+    return lax.fori_loop(0, choices.newton_iterations, iteration, carry)
+
+
+def residuals(problem: Problem, rotations: jax.Array, choices: Choices) -> jax.Array:
+    """The norm of the gradient of the potential before each of the iterations, shape (newton_iterations,), N."""
+
+    def iteration(carry: tuple[jax.Array, jax.Array], _: None) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
+        displacement, rotations, force = _newton_iteration(problem, *carry, choices)
+        return (displacement, rotations), jnp.sqrt(jnp.sum(force**2))
+
+    carry = (jnp.zeros_like(problem.start), rotations)
+    return lax.scan(iteration, carry, length=choices.newton_iterations)[1]
+
+
+def _newton_iteration(
+    problem: Problem, displacement: jax.Array, rotations: jax.Array, choices: Choices
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """The next displacement; the rotations and the force at the present one."""
+    elements = problem.elements
+    gradients = elasticity.deformation_gradients(problem.start + displacement, elements)
+    rotations = _rotations(gradients, rotations, choices)
+    if choices.tangent == "held":
+        tangent = elasticity.held_tangent(rotations, elements)
+    elif choices.tangent == "exact":
+        tangent = elasticity.exact_tangent(gradients, rotations, elements)
+    else:
+        tangent = elasticity.projected_tangent(gradients, rotations, elements)
+
+    def stiffness(direction: jax.Array) -> jax.Array:
+        stress_dot = tangent(elasticity.deformation_gradients(direction, elements))
+        return problem.inertia[:, None] * direction + elasticity.nodal_gradient(stress_dot, elements)
+
+    internal = elasticity.nodal_gradient(elasticity.stress(gradients, rotations, elements), elements)
+    force = problem.free[:, None] * (problem.load - problem.inertia[:, None] * displacement - internal)
+    change = _solve(stiffness, force, problem, choices)
+    if choices.line_search:
+        change = change * _step_length(problem, displacement, change, rotations, choices)
+    return displacement + change, rotations, force
+
+
+def _rotations(gradients: jax.Array, rotations: jax.Array, choices: Choices) -> jax.Array:
+    return elasticity.element_rotations(gradients, rotations, rotation=choices.rotation, iterations=choices.iterations)
+
+
+def _solve(
+    stiffness: Callable[[jax.Array], jax.Array], force: jax.Array, problem: Problem, choices: Choices
+) -> jax.Array:
+    """The displacement by conjugate gradients, scaled by the square root of the diagonal of the matrix.
+
+    Unknowns and right-hand side get the size 1, whatever the units: the squares of forces of 1e11 N, or of lengths in
+    nanometres, are outside of float32. What is scaled out again needs no derivative.
+    """
+    diagonal = problem.inertia + elasticity.stiffness_diagonal(problem.elements)
+    scale = lax.stop_gradient(problem.free / jnp.sqrt(diagonal))[:, None]
+    fixed = 1 - problem.free[:, None]
+    right = scale * force
+    largest = lax.stop_gradient(jnp.max(jnp.abs(right)))
+    size = jnp.where(largest > 0, largest, jnp.ones_like(largest))
+
+    def product(scaled: jax.Array) -> jax.Array:
+        return scale * stiffness(scale * scaled) + fixed * scaled
+
+    solution, _ = cg(product, right / size, tol=choices.tolerance, maxiter=choices.conjugate_gradients)
+    return scale * (solution * size)
+
+
+def _step_length(
+    problem: Problem, displacement: jax.Array, change: jax.Array, rotations: jax.Array, choices: Choices
+) -> jax.Array:
+    """The largest of 1, ½, ¼, … at which the potential does not increase, the smallest if there is none."""
+
+    def potential(length: jax.Array) -> tuple[jax.Array, jax.Array]:
+        total = displacement + length * change
+        gradients = elasticity.deformation_gradients(problem.start + total, problem.elements)
+        elastic = elasticity.energy(gradients, _rotations(gradients, rotations, choices), problem.elements)
+        inertia = 0.5 * jnp.sum(problem.inertia[:, None] * total**2)
+        load = jnp.sum(total * problem.load)
+        return inertia - load + elastic, inertia + jnp.abs(load) + elastic
+
+    lengths = 0.5 ** jnp.arange(choices.line_search + 1).astype(change.dtype)
+    before, magnitude = potential(jnp.zeros_like(lengths[0]))
+    after, _ = lax.map(potential, lengths)
+    # Near the minimum the potential changes by less than its own rounding, and the full step is right.
+    allowed = before + 32 * jnp.finfo(change.dtype).eps * magnitude
+    accepted = after <= allowed
+    return jnp.where(jnp.any(accepted), lengths[jnp.argmax(accepted)], lengths[-1])

@@ -1,0 +1,150 @@
+"""Meshes of tetrahedra: boxes, files of the user's, their checks, and what finite elements need of them."""
+
+import contextlib
+import io
+import itertools
+import pathlib
+from typing import NamedTuple
+
+import numpy as np
+
+_CORNERS = 4
+
+
+class Mesh(NamedTuple):
+    """A mesh of tetrahedra.
+
+    Attributes:
+        vertices: At rest, float64 of shape (n, 3), m.
+        tetrahedra: Vertex indices, shape (m, 4); the volume of each is positive once `checked`.
+    """
+
+    vertices: np.ndarray
+    tetrahedra: np.ndarray
+
+
+def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
+    """A box from the origin, each of its cells divided into six tetrahedra around the cell's diagonal.
+
+    The tetrahedra of neighbouring cells match without alternating patterns (Kuhn 1960).
+
+    Args:
+        cells: Number of cells along each axis, at least 1.
+        size: Lengths of the box, m.
+    """
+    if min(cells) < 1 or not all(np.isfinite(size)) or min(size) <= 0:
+        raise ValueError(f"a box needs at least one cell and a positive length along each axis; got {cells} and {size}")
+    counts = np.array(cells) + 1
+    grid = np.stack(np.meshgrid(*(np.arange(count) for count in counts), indexing="ij"), axis=-1)
+    strides = np.array([counts[1] * counts[2], counts[2], 1])
+    first = (grid[:-1, :-1, :-1] @ strides).reshape(-1, 1)
+    # From one end of the diagonal to the other, along the three axes in every order.
+    paths = [np.cumsum([0, *strides[list(order)]]) for order in itertools.permutations(range(3))]
+    vertices = grid.reshape(-1, 3) * (np.array(size) / np.array(cells))
+    return checked(vertices, np.concatenate([first + path for path in paths]))
+
+
+def read(path: str | pathlib.Path) -> Mesh:
+    """The tetrahedra of a file in any format that meshio reads; vertices of no tetrahedron are left out.
+
+    Raises:
+        ValueError: meshio is not installed, the file is missing or cannot be read, or the mesh is unusable.
+    """
+    try:
+        import meshio
+    except ImportError:
+        raise ValueError("reading a mesh needs meshio: pip install 'jaxrot[scenes]'") from None
+    # meshio prints what goes wrong, and ends the process.
+    messages = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(messages), contextlib.redirect_stderr(messages):
+            content = meshio.read(path)
+    except (Exception, SystemExit) as error:
+        reason = " ".join(str(error).split()) if isinstance(error, meshio.ReadError | OSError) else "not a mesh file"
+        raise ValueError(f"cannot read the mesh {path}: {reason}") from None
+    # Quadratic tetrahedra have their corners first.
+    cells = [block.data[:, :_CORNERS] for block in content.cells if block.type in ("tetra", "tetra10")]
+    if not cells:
+        kinds = ", ".join(sorted({block.type for block in content.cells})) or "none"
+        raise ValueError(f"the mesh {path} has no tetrahedra; its cells: {kinds}")
+    used, indices = np.unique(np.concatenate(cells), return_inverse=True)
+    return checked(np.asarray(content.points)[used], indices.reshape(-1, _CORNERS))
+
+
+def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
+    """The mesh with every tetrahedron turned so that its volume is positive.
+
+    Raises:
+        ValueError: No tetrahedra, wrong shapes, an index of no vertex, a vertex that is not finite or belongs to no
+            tetrahedron, a flat tetrahedron.
+    """
+    vertices, tetrahedra = np.asarray(vertices), np.asarray(tetrahedra)
+    if tetrahedra.size == 0:
+        raise ValueError("the mesh has no tetrahedra")
+    if tetrahedra.ndim != 2 or tetrahedra.shape[1] != _CORNERS or not np.issubdtype(tetrahedra.dtype, np.integer):
+        raise ValueError(
+            f"tetrahedra must be integers of shape (m, 4); got {tetrahedra.dtype} of shape {tetrahedra.shape}"
+        )
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError(f"vertices must have shape (n, 3); got {vertices.shape}")
+    if not np.isfinite(vertices).all():
+        index = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
+        raise ValueError(f"vertex {index} is not finite: {vertices[index].tolist()}")
+    if tetrahedra.min() < 0 or tetrahedra.max() >= len(vertices):
+        raise ValueError(f"a tetrahedron names a vertex outside 0 to {len(vertices) - 1}")
+    alone = np.setdiff1d(np.arange(len(vertices)), tetrahedra)
+    if len(alone):
+        raise ValueError(f"vertex {alone[0]} belongs to no tetrahedron, it would have no mass")
+    mesh = _turned(Mesh(vertices.astype(np.float64), tetrahedra.astype(np.int32)))
+    edges = edge_matrices(mesh)
+    # Relative to the longest edge: a mesh in micrometres is no flatter than one in kilometres.
+    flat = np.linalg.det(edges) <= 1e-9 * np.linalg.norm(edges, axis=-2).max(axis=-1) ** 3
+    if flat.any():
+        raise ValueError(f"tetrahedron {int(np.argmax(flat))} is flat, {int(flat.sum())} of {len(flat)} are")
+    return mesh
+
+
+def _turned(mesh: Mesh) -> Mesh:
+    negative = np.linalg.det(edge_matrices(mesh)) < 0
+    swapped = mesh.tetrahedra[:, [0, 1, 3, 2]]
+    return mesh._replace(tetrahedra=np.where(negative[:, None], swapped, mesh.tetrahedra))
+
+
+def edge_matrices(mesh: Mesh) -> np.ndarray:
+    """The edges from the first corner to the others, as columns: shape (m, 3, 3)."""
+    corners = mesh.vertices[mesh.tetrahedra]
+    return np.swapaxes(corners[:, 1:] - corners[:, :1], -1, -2)
+
+
+def volumes(mesh: Mesh) -> np.ndarray:
+    """The volumes of the tetrahedra, shape (m,)."""
+    return np.linalg.det(edge_matrices(mesh)) / 6
+
+
+def lumped_masses(mesh: Mesh, density: np.ndarray | float) -> np.ndarray:
+    """A quarter of the mass of each tetrahedron to each of its corners: shape (n,), kg."""
+    quarter = np.broadcast_to(density * volumes(mesh) / _CORNERS, (_CORNERS, len(mesh.tetrahedra)))
+    return np.bincount(mesh.tetrahedra.T.ravel(), weights=quarter.ravel(), minlength=len(mesh.vertices))
+
+
+def incidence(mesh: Mesh) -> np.ndarray:
+    """Where each vertex occurs in `tetrahedra.ravel()`: shape (n, largest valence).
+
+    Rows are filled up with 4 m, the first index past the end. Forces are gathered through it: a scatter is slow on a
+    processor, and adds in an order that is not fixed on an accelerator.
+    """
+    corners = mesh.tetrahedra.ravel()
+    order = np.argsort(corners, kind="stable")
+    valence = np.bincount(corners, minlength=len(mesh.vertices))
+    column = np.arange(corners.size) - np.repeat(np.cumsum(valence) - valence, valence)
+    table = np.full((len(mesh.vertices), valence.max()), corners.size, dtype=np.int32)
+    table[corners[order], column] = order
+    return table
+
+
+def surface_edges(mesh: Mesh) -> np.ndarray:
+    """The edges of the triangles that belong to one tetrahedron: pairs of vertices, shape (k, 2)."""
+    faces = np.concatenate([mesh.tetrahedra[:, list(face)] for face in itertools.combinations(range(_CORNERS), 3)])
+    triangles, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
+    outer = triangles[count == 1]
+    return np.unique(np.concatenate([outer[:, [0, 1]], outer[:, [0, 2]], outer[:, [1, 2]]]), axis=0)
