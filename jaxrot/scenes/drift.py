@@ -121,7 +121,7 @@ def advance(
 
 
 def reference(state: State, parameters: Parameters) -> jax.Array:
-    """The exact rotation after `state.step_count` steps, in closed form, to a few eps at any count; shape (..., 3, 3)."""
+    """The exact rotation after `state.step_count` steps, in closed form, to a few eps at any count; (..., 3, 3)."""
     return cycles.power(parameters.cycle, state.step_count)
 
 
