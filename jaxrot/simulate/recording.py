@@ -47,7 +47,15 @@ def record(scene: Scene, steps: int, frames: int, advance: Callable[[str], None]
     # The number of steps is an argument: the last stretch may be shorter, and needs no program of its own.
     run = jax.jit(lambda state, count: jax.lax.fori_loop(0, count, lambda _, state: scene.step(state), state))
     run = run.lower(scene.state, stretch).compile()
-    look = jax.jit(lambda state: (scene.points(state), scene.health(state)))
+    names: list[str] = []
+
+    @jax.jit
+    def look(state: State) -> tuple[jax.Array, list[jax.Array]]:
+        health = scene.health(state)
+        # JAX returns a dictionary in the order of the alphabet.
+        names[:] = health
+        return scene.points(state), list(health.values())
+
     seen, made = [jax.device_get(look(scene.state))], [0]
     compile_seconds, seconds = time.perf_counter() - begun, 0.0
     state = scene.state
@@ -63,7 +71,7 @@ def record(scene: Scene, steps: int, frames: int, advance: Callable[[str], None]
     return Recording(
         times=scene.step_seconds * np.array(made),
         points=np.stack([points for points, _ in seen]),
-        health={name: np.array([float(health[name]) for _, health in seen]) for name in seen[0][1]},
+        health={name: np.array([float(health[index]) for _, health in seen]) for index, name in enumerate(names)},
         steps=made[-1],
         seconds=seconds,
         compile_seconds=compile_seconds,

@@ -1,0 +1,184 @@
+"""Drift: a rotation matrix turned by a million small rotations, and repaired or not.
+
+Rounding takes the product off the rotations and away from the exact one. Which repair holds it, and how often it is
+needed, is what this scene measures; its reference has no error that grows.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.typing import ArrayLike
+
+from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation, refine_rotation
+from jaxrot.scenes import cycles
+from jaxrot.scenes.cycles import Cycle
+from jaxrot.scenes.free_top import tumbling_rates
+from jaxrot.scenes.scene import Scene
+
+# What `drift` shows side by side: a name, the repair, and after how many products.
+_SHOWN = (
+    ("no repair", None, 1),
+    ("gram_schmidt", "gram_schmidt", 1),
+    ("taylor", "taylor", 1),
+    ("taylor every 1,000", "taylor", 1000),
+    (DEFAULT_METHOD, DEFAULT_METHOD, 1),
+)
+_PRODUCTS = 1000  # a frame of `drift`
+_MAGNIFIED = 20  # the deviation in its pictures: without repair it is a twentieth of the axes at the end
+
+
+class State(NamedTuple):
+    """What turns: any number of bodies.
+
+    Attributes:
+        rotation: From the body's axes to space, shape (..., 3, 3).
+        step_count: The steps made, int32, shape (): one for all bodies.
+    """
+
+    rotation: jax.Array
+    step_count: jax.Array
+
+
+class Parameters(NamedTuple):
+    """How it turns: by a cycle of increments, over and over.
+
+    Attributes:
+        increments: The rotations in the body's axes by which the steps turn, shape (period, ..., 3, 3).
+        cycle: What the reference needs.
+    """
+
+    increments: jax.Array
+    cycle: Cycle
+
+
+def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -> tuple[State, Parameters]:
+    """Bodies that turn at these rates, from the identity.
+
+    The increments are exp([ω]× Δt), rounded to the dtype. The reference turns by the rotations nearest to the rounded
+    ones: what a body then is away from it, repair and rounding of the products have done, and nothing else.
+
+    Args:
+        rates: Body rates ω of every step of a cycle, rad/s, shape (period, ..., 3); a constant rate has the period 1.
+        time_step: Δt, s, shape () or (...).
+        dtype: Of the rotations, float32 or float64.
+
+    Raises:
+        ValueError: Wrong shape; a rate that is not finite; a time step that is not finite and positive; a step of a
+            quarter turn or more.
+    """
+    w, h = np.asarray(rates, dtype=np.float64), np.asarray(time_step, dtype=np.float64)
+    if w.ndim < 2 or w.shape[-1] != 3 or w.size == 0:
+        raise ValueError(f"rates must have shape (period, ..., 3), none of them 0; got {w.shape}")
+    if not np.all(np.isfinite(w)):
+        raise ValueError("rates must be finite; got NaN or inf")
+    if h.shape not in ((), w.shape[1:-1]):
+        raise ValueError(f"time_step must have shape () or {w.shape[1:-1]}, that of the bodies; got {h.shape}")
+    if not np.all(np.isfinite(h) & (h > 0)):
+        raise ValueError(f"time_step must be finite and positive; got {time_step}")
+    vectors = w * h[..., None]
+    angle = np.max(np.linalg.norm(vectors, axis=-1))
+    if angle >= np.pi / 2:
+        raise ValueError(f"a step must turn by less than a quarter turn, pi/2; got {angle:.3g} rad")
+    increments = cycles.rotations(vectors).astype(dtype)
+    rotation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), increments.shape[1:])
+    return State(rotation, jnp.int32(0)), Parameters(jnp.asarray(increments), cycles.of(increments))
+
+
+def step(state: State, parameters: Parameters, *, repair: str | None = DEFAULT_METHOD, every: int = 1) -> State:
+    """One product, R ← R exp([ω]× Δt), and its repair.
+
+    Args:
+        state: See `State`.
+        parameters: See `Parameters`.
+        repair: A name in `METHODS`, or None for no repair, which then costs nothing. Static.
+        every: Repair after every so many products. Static; 1 leaves the question whether out of the program. A `vmap`
+            over `step_count` would repair in every step and choose afterwards: let the arrays hold the bodies instead.
+
+    Raises:
+        ValueError: Unknown repair, or `every` below 1.
+    """
+    if repair is not None and repair not in METHODS:
+        raise ValueError(f"repair must be None or one of {', '.join(sorted(METHODS))}; got {repair!r}")
+    if not isinstance(every, int) or every < 1:
+        raise ValueError(f"every must be a static integer, 1 or more; got {every}")
+    rotation = _product(state.rotation, parameters.increments[state.step_count % len(parameters.increments)])
+    count = state.step_count + 1
+    if repair is not None and every == 1:
+        rotation = nearest_rotation(rotation, method=repair)
+    elif repair is not None:
+        rotation = lax.cond(count % every == 0, lambda r: nearest_rotation(r, method=repair), lambda r: r, rotation)
+    return State(rotation, count)
+
+
+def advance(
+    state: State, parameters: Parameters, steps: ArrayLike, *, repair: str | None = DEFAULT_METHOD, every: int = 1
+) -> State:
+    """Many steps; their number may be traced, so that one program makes any number of them."""
+    return lax.fori_loop(0, steps, lambda _, s: step(s, parameters, repair=repair, every=every), state)
+
+
+def reference(state: State, parameters: Parameters) -> jax.Array:
+    """The exact rotation after `state.step_count` steps, in closed form, to a few eps at any count; (..., 3, 3)."""
+    return cycles.power(parameters.cycle, state.step_count)
+
+
+def orientation_error(state: State, parameters: Parameters) -> jax.Array:
+    """The angle between the reference and the rotation nearest to the state's matrix, rad, shape (...)."""
+    exact = jnp.broadcast_to(reference(state, parameters), state.rotation.shape)
+    # Three steps from the reference: cubic convergence, from any start.
+    nearest = refine_rotation(state.rotation, exact, step="newton", iterations=3)
+    return 2 * jnp.arcsin(jnp.minimum(jnp.sqrt(_sum_of_squares(nearest - exact) / 8), 1))
+
+
+def orthonormality_error(state: State) -> jax.Array:
+    """‖RᵀR − 1‖_F, without unit, shape (...)."""
+    square = _product(jnp.swapaxes(state.rotation, -1, -2), state.rotation)
+    return jnp.sqrt(_sum_of_squares(square - jnp.broadcast_to(jnp.eye(3, dtype=square.dtype), square.shape)))
+
+
+def drift() -> Scene:
+    """A tumbling top, five times beside the exact one: without repair, and with four. A step is 1,000 products.
+
+    The picture shows the axes of each, their deviation from the exact axes (drawn above) magnified 20 times.
+    """
+    rates, time_step = tumbling_rates((1.0, 2.0, 3.0), (0.05, 1.0, 0.05), 500)
+    start, parameters = build(rates, time_step)
+
+    def frame(states: tuple[State, ...]) -> tuple[State, ...]:
+        return tuple(
+            advance(state, parameters, _PRODUCTS, repair=repair, every=every)
+            for state, (_, repair, every) in zip(states, _SHOWN, strict=True)
+        )
+
+    def health(states: tuple[State, ...]) -> dict[str, jax.Array]:
+        together = State(jnp.stack([state.rotation for state in states]), states[0].step_count)
+        orientation, orthonormality = orientation_error(together, parameters), orthonormality_error(together)
+        watched = {f"orientation error, {shown[0]} (rad)": orientation[i] for i, shown in enumerate(_SHOWN)}
+        return watched | {f"orthonormality error, {shown[0]} (1)": orthonormality[i] for i, shown in enumerate(_SHOWN)}
+
+    def points(states: tuple[State, ...]) -> jax.Array:
+        exact = reference(states[0], parameters)
+        axes = [exact, *(exact + _MAGNIFIED * (state.rotation - exact) for state in states)]
+        places = np.array([[2.5 * len(states), 0, 5], *([5.0 * i + 2.5, 0, 0] for i in range(len(states)))])
+        origins = jnp.asarray(places, dtype=exact.dtype)[:, None, :]
+        # The columns are the axes; the origin is the first point of each frame.
+        tips = jnp.swapaxes(jnp.stack(axes), -1, -2)
+        return jnp.concatenate([origins, origins + tips], axis=1).reshape(-1, 3)
+
+    lines = np.array([(4 * i, 4 * i + axis) for i in range(len(_SHOWN) + 1) for axis in (1, 2, 3)])
+    names = ", ".join(name for name, _, _ in _SHOWN)
+    title = f"Drift of a tumbling top, deviation x{_MAGNIFIED}: {names}; above: exact"
+    return Scene(title, (start,) * len(_SHOWN), frame, health, points, lines, float(_PRODUCTS * time_step), 1000)
+
+
+def _product(a: jax.Array, b: jax.Array) -> jax.Array:
+    """The matrix product, elementwise: an accelerator would round the factors of `@` to TF32, 1e-3."""
+    x, y, z = (a[..., :, i, None] * b[..., i, None, :] for i in range(3))
+    return x + y + z
+
+
+def _sum_of_squares(matrix: jax.Array) -> jax.Array:
+    return jnp.sum(matrix * matrix, axis=(-2, -1))

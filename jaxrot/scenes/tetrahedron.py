@@ -1,0 +1,208 @@
+"""The tetrahedron of Figs. 3 to 5: its tip is pushed through the base, and the rotation follows from frame to frame.
+
+Source: Müller et al. 2016, section 4. The paper gives no shape; for the deformation gradient only the slant matters,
+the angle between the path and the normal of the base.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.typing import ArrayLike
+
+from jaxrot import nearest_rotation, refine_rotation, rotation_gap
+from jaxrot._scaling import safe_sqrt
+from jaxrot.scenes.scene import Scene
+
+SPIKE = -0.66  # det F where Fig. 4 has its spike
+SLANT = 0.5 * float(np.arccos(-SPIKE))  # where the rotation turns fastest at that determinant, −cos 2θ
+RADIUS = float(np.sqrt(-SPIKE / 2))  # of the base: the shape-matching matrix has its jump there, −2 radius²
+_MATRICES = ("deformation_gradient", "shape_matching")
+_FRAMES = 320
+
+
+class State(NamedTuple):
+    """What moves.
+
+    Attributes:
+        rotation: The rotation extracted in this frame, the start of the next one's, shape (3, 3).
+        frame: Its number, int32, shape ().
+    """
+
+    rotation: jax.Array
+    frame: jax.Array
+
+
+class Parameters(NamedTuple):
+    """What does not.
+
+    Attributes:
+        tip_path: Place of the tip in every frame, m, shape (frames, 3); after the last it stays.
+        base: The three fixed vertices, m, shape (3, 3), a vertex a row.
+        shape: What makes A of the edges [x₁−x₀ x₂−x₀ x₃−x₀]: A = edges · shape, shape (3, 3). For the deformation
+            gradient the inverse of the edges at rest, 1/m; for shape matching that times Σ x̄ x̄ᵀ, m.
+    """
+
+    tip_path: jax.Array
+    base: jax.Array
+    shape: jax.Array
+
+
+def slanted_tetrahedron(slant: float = SLANT, radius: float = RADIUS) -> np.ndarray:
+    """A regular base around the origin, its normal off the x-axis by the slant (rad), and the tip at (1, 0, 0).
+
+    Returns:
+        Vertices, the tip last, shape (4, 3).
+    """
+    angle = 2 * np.pi / 3 * np.arange(3)[:, None]
+    base = np.cos(angle) * [-np.sin(slant), np.cos(slant), 0] + np.sin(angle) * [0.0, 0, 1]
+    return np.vstack([radius * base, [1.0, 0, 0]])
+
+
+def pushed_through(frames: int = _FRAMES) -> np.ndarray:
+    """The tip on the x-axis from 1 through the base at 0 to −1, its mirror image: for that tetrahedron x = det F.
+
+    Returns:
+        The path, shape (frames + 1, 3).
+    """
+    path = np.zeros((frames + 1, 3))
+    path[:, 0] = np.linspace(1, -1, frames + 1)
+    return path
+
+
+def build(
+    rest: ArrayLike, tip_path: ArrayLike, *, matrix: str = "deformation_gradient", dtype: type = np.float32
+) -> tuple[State, Parameters]:
+    """A tetrahedron and the path of its tip; the first rotation is the identity.
+
+    Args:
+        rest: Vertices at rest, the tip last, m, shape (4, 3).
+        tip_path: Place of the tip in every frame, m, shape (frames, 3).
+        matrix: What the rotation is taken of: "deformation_gradient", or "shape_matching", Σ x x̄ᵀ over the four
+            vertices, from their mean.
+        dtype: Of all arrays, float32 or float64.
+
+    Raises:
+        ValueError: Wrong shape; a vertex or a place that is not finite; a flat tetrahedron; an unknown matrix.
+    """
+    vertices, path = np.asarray(rest, dtype=np.float64), np.asarray(tip_path, dtype=np.float64)
+    if vertices.shape != (4, 3):
+        raise ValueError(f"rest must have shape (4, 3), a vertex a row; got {vertices.shape}")
+    if path.ndim != 2 or path.shape[1] != 3 or len(path) == 0:
+        raise ValueError(f"tip_path must have shape (frames, 3), one frame or more; got {path.shape}")
+    if not (np.all(np.isfinite(vertices)) and np.all(np.isfinite(path))):
+        raise ValueError("rest and tip_path must be finite; got NaN or inf")
+    if matrix not in _MATRICES:
+        raise ValueError(f"matrix must be one of {', '.join(_MATRICES)}; got {matrix!r}")
+    edges = (vertices[1:] - vertices[0]).T
+    if np.linalg.cond(edges) > 1e6:  # as many digits as float32 has
+        raise ValueError("rest must be a tetrahedron with a volume; got a flat one")
+    shape = np.linalg.inv(edges)
+    if matrix == "shape_matching":
+        offsets = vertices - np.mean(vertices, axis=0)
+        shape = shape @ (offsets.T @ offsets)
+    arrays = (jnp.asarray(array, dtype=dtype) for array in (path, vertices[:3], shape))
+    return State(jnp.eye(3, dtype=dtype), jnp.int32(0)), Parameters(*arrays)
+
+
+def vertices_in(parameters: Parameters, frame: jax.Array) -> jax.Array:
+    """The four vertices in a frame, the tip last, m, shape (4, 3)."""
+    last = len(parameters.tip_path) - 1
+    return jnp.concatenate([parameters.base, parameters.tip_path[jnp.minimum(frame, last)][None]])
+
+
+def matrix_in(parameters: Parameters, frame: jax.Array) -> jax.Array:
+    """The matrix whose rotation is wanted in a frame, shape (3, 3)."""
+    vertices = vertices_in(parameters, frame)
+    edges = vertices[1:] - vertices[:1]
+    return jnp.sum(edges[:, :, None] * parameters.shape[:, None, :], axis=0)
+
+
+def step(
+    state: State,
+    parameters: Parameters,
+    *,
+    rotation_step: str = "torque",
+    iterations: int = 1,
+    escape: bool = False,
+    method: str | None = None,
+) -> State:
+    """The next frame: the tip moves on, and the rotation of the matrix is extracted.
+
+    Args:
+        state: See `State`.
+        parameters: See `Parameters`.
+        rotation_step: A name in `STEPS`, run from the rotation of the last frame. Static.
+        iterations: How many. Static.
+        escape: Leave a half turn off the solution, see `refine_rotation`. Static.
+        method: A name in `METHODS`, run from nothing, in place of those steps; None for them. Static.
+
+    Raises:
+        ValueError: Unknown step or method, negative iterations.
+
+    Derivative: With the steps it is that of what was computed, through all frames, with a method that of the nearest
+        rotation.
+    """
+    frame = state.frame + 1
+    matrix = matrix_in(parameters, frame)
+    if method is not None:
+        return State(nearest_rotation(matrix, method=method), frame)
+    # Unrolled: one iteration a frame has not converged, and the rule of the limit would be wrong.
+    rotation = refine_rotation(
+        matrix, state.rotation, step=rotation_step, iterations=iterations, escape=escape, derivative="unrolled"
+    )
+    return State(rotation, frame)
+
+
+def follow(
+    state: State,
+    parameters: Parameters,
+    *,
+    rotation_step: str = "torque",
+    iterations: int = 1,
+    escape: bool = False,
+    method: str | None = None,
+) -> jax.Array:
+    """The rotations of all frames of the path, the first as given, shape (frames, 3, 3); the choices are `step`'s."""
+
+    def advance(now: State, _: None) -> tuple[State, jax.Array]:
+        after = step(now, parameters, rotation_step=rotation_step, iterations=iterations, escape=escape, method=method)
+        return after, after.rotation
+
+    rotations = lax.scan(advance, state, None, length=len(parameters.tip_path) - 1)[1]
+    return jnp.concatenate([state.rotation[None], rotations])
+
+
+def angle_between(rotation: jax.Array, other: jax.Array) -> jax.Array:
+    """The angle of the rotation from one to the other, rad, shape (...)."""
+    chord = safe_sqrt(jnp.sum((rotation - other) ** 2, axis=(-2, -1)) / 8)
+    return 2 * jnp.arcsin(jnp.minimum(chord, 1))
+
+
+def tetrahedron() -> Scene:
+    """The tetrahedron of Fig. 3, pushed through its base in 320 frames; its axes by one torque iteration a frame."""
+    start, parameters = build(slanted_tetrahedron(), pushed_through())
+
+    def health(state: State) -> dict[str, jax.Array]:
+        matrix = matrix_in(parameters, state.frame)
+        identity = jnp.eye(3, dtype=matrix.dtype)
+        defect = jnp.sum(state.rotation[:, :, None] * state.rotation[:, None, :], axis=0) - identity
+        return {
+            "det F (1)": jnp.dot(jnp.cross(matrix[0], matrix[1]), matrix[2], precision="highest"),
+            "gap (s2+s3)/s1 (1)": rotation_gap(matrix),
+            "turned by (rad)": angle_between(state.rotation, identity),
+            "distance to the nearest rotation (rad)": angle_between(state.rotation, nearest_rotation(matrix)),
+            "orthonormality error (1)": safe_sqrt(jnp.sum(defect * defect)),
+        }
+
+    def points(state: State) -> jax.Array:
+        vertices = vertices_in(parameters, state.frame)
+        middle = jnp.mean(parameters.base, axis=0, keepdims=True)
+        drawn = jnp.concatenate([vertices, middle, middle + 0.5 * jnp.swapaxes(state.rotation, 0, 1)])
+        return jnp.roll(drawn, -1, axis=-1)  # the path, along x, upright
+
+    lines = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3), (4, 5), (4, 6), (4, 7)])
+    title = "A tetrahedron pushed through its base, one torque iteration a frame"
+    return Scene(title, start, lambda state: step(state, parameters), health, points, lines, 1 / 60, _FRAMES)
