@@ -1,6 +1,7 @@
 """The animation of a run, as a GIF."""
 
 import tempfile
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ def draw_animation(recording: Recording, lines: np.ndarray, title: str) -> bytes
     axes.set_axis_off()
     axes.view_init(elev=15, azim=-65)
     _set_limits(axes, recording.points)
-    figure.text(0.5, 0.97, title, ha="center", va="top", fontsize=11)
+    figure.text(0.5, 0.98, textwrap.fill(title, 60), ha="center", va="top", fontsize=11)
     clock = figure.text(0.02, 0.02, "", fontsize=10, family="monospace")
     move = _lines(axes, lines) if len(lines) else _points(axes, recording.points.shape[1])
 

@@ -2,8 +2,8 @@
 
 import csv
 import io
-import itertools
-import re
+import textwrap
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +23,13 @@ def draw_health(recording: Recording, title: str) -> bytes:
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(5 * columns, 2.7 * rows + 0.5), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
-    for number, (unit, names) in enumerate(panels.items(), start=1):
+    figure.suptitle(textwrap.fill(title, 50 * columns), fontsize=11)
+    for number, (unit, numbers) in enumerate(panels.items(), start=1):
         axes = figure.add_subplot(rows, columns, number)
-        for name, color in zip(names, itertools.cycle(_COLORS)):
-            axes.plot(recording.times, recording.health[f"{name} ({unit})"], color=color, label=name, linewidth=1.4)
-        _scale(axes, np.concatenate([recording.health[f"{name} ({unit})"] for name in names]))
+        axes.set_prop_cycle(color=_COLORS)
+        for name, values in numbers.items():
+            axes.plot(recording.times, values, label=name, linewidth=1.4)
+        _scale(axes, np.concatenate(list(numbers.values())))
         axes.set_xlabel("simulated time (s)")
         axes.set_ylabel("without unit" if unit == "1" else unit)
         axes.legend(fontsize=8, frameon=False)
@@ -51,8 +52,8 @@ def as_csv(recording: Recording) -> str:
 
 def complaints(recording: Recording) -> list[str]:
     """One line for each watched number, and for the points, that did not stay finite."""
-    finite = {name: np.isfinite(values) for name, values in recording.health.items()}
-    finite["a position"] = np.isfinite(recording.points).all(axis=(1, 2))
+    positions = np.isfinite(recording.points).all(axis=(1, 2))
+    finite = {"a position": positions, **{name: np.isfinite(values) for name, values in recording.health.items()}}
     return [
         f"{name} is not finite from t = {recording.times[np.argmin(ok)]:.3g} s on"
         for name, ok in finite.items()
@@ -60,17 +61,16 @@ def complaints(recording: Recording) -> list[str]:
     ]
 
 
-def _by_unit(health: dict[str, np.ndarray]) -> dict[str, list[str]]:
-    panels: dict[str, list[str]] = {}
-    for full_name in health:
-        match = re.fullmatch(r"(.*) \((.*)\)", full_name)
-        if match is None:
-            raise ValueError(f"a watched number is named with its unit: 'kinetic energy (J)'; got {full_name!r}")
-        panels.setdefault(match[2], []).append(match[1])
+def _by_unit(health: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
+    """The numbers by unit and name; one named "speed (m/s)" has the unit m/s, one without parentheses none."""
+    panels: dict[str, dict[str, np.ndarray]] = {}
+    for full_name, values in health.items():
+        name, _, unit = full_name.removesuffix(")").rpartition(" (")
+        panels.setdefault(unit if name else "1", {})[name or full_name] = values
     return panels
 
 
-def _scale(axes, values: np.ndarray) -> None:
+def _scale(axes: Any, values: np.ndarray) -> None:
     positive = values[np.isfinite(values) & (values > 0)]
     if (values < 0).any() or not len(positive) or positive.max() < 1e3 * positive.min():
         return
