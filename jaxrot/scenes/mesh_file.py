@@ -25,7 +25,8 @@ def read(path: Path) -> Any:
             return meshio.read(path)
     except (Exception, SystemExit) as error:
         known = isinstance(error, meshio.ReadError | OSError) and str(error)
-        raise ValueError(f"cannot be read ({' '.join(str(error).split()) if known else 'not a mesh file'})") from None
+        reason = " ".join(str(error).split()).removesuffix(".") if known else "not a mesh file"
+        raise ValueError(f"the mesh cannot be read ({reason})") from None
 
 
 def vertices(path: Path) -> np.ndarray:

@@ -1,12 +1,12 @@
 """Meshes of tetrahedra: boxes, files of the user's, their checks, and what finite elements need of them."""
 
-import contextlib
-import io
 import itertools
-import pathlib
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+from jaxrot.scenes import mesh_file
 
 _CORNERS = 4
 
@@ -44,29 +44,18 @@ def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
     return checked(vertices, np.concatenate([first + path for path in paths]))
 
 
-def read(path: str | pathlib.Path) -> Mesh:
-    """The tetrahedra of a file in any format that meshio reads; vertices of no tetrahedron are left out.
+def read(path: Path) -> Mesh:
+    """The tetrahedra in a mesh file; vertices of no tetrahedron are left out.
 
     Raises:
-        ValueError: meshio is not installed, the file is missing or cannot be read, or the mesh is unusable.
+        ValueError: It cannot be read, or the mesh is unusable.
     """
-    try:
-        import meshio
-    except ImportError:
-        raise ValueError("reading a mesh needs meshio: pip install 'jaxrot[scenes]'") from None
-    # meshio prints what goes wrong, and ends the process.
-    messages = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(messages), contextlib.redirect_stderr(messages):
-            content = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split()) if isinstance(error, meshio.ReadError | OSError) else "not a mesh file"
-        raise ValueError(f"cannot read the mesh {path}: {reason}") from None
+    content = mesh_file.read(path)
     # Quadratic tetrahedra have their corners first.
     cells = [block.data[:, :_CORNERS] for block in content.cells if block.type in ("tetra", "tetra10")]
     if not cells:
         kinds = ", ".join(sorted({block.type for block in content.cells})) or "none"
-        raise ValueError(f"the mesh {path} has no tetrahedra; its cells: {kinds}")
+        raise ValueError(f"the mesh has no tetrahedra; its cells: {kinds}")
     used, indices = np.unique(np.concatenate(cells), return_inverse=True)
     return checked(np.asarray(content.points)[used], indices.reshape(-1, _CORNERS))
 

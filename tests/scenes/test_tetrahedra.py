@@ -83,8 +83,8 @@ def test_a_file_that_is_no_mesh_of_tetrahedra_is_refused_in_one_line(tmp_path, c
     for path, message in [
         (surface, "has no tetrahedra; its cells: triangle"),
         (tmp_path / "absent.vtk", "not found"),
-        (broken, "cannot read the mesh"),
-        (unknown, "cannot read the mesh"),
+        (broken, "the mesh cannot be read"),
+        (unknown, "the mesh cannot be read"),
     ]:
         with pytest.raises(ValueError, match=message) as refusal:
             read(path)
