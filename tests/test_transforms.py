@@ -35,7 +35,14 @@ FUNCTIONS = {
 }
 # What is only lowered costs little: the 9×9 matrices take part there.
 LOWERED = {**FUNCTIONS, "all parts": all_parts}
-all_functions = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS.keys())
+SELDOM = {"decomposition", "refine_rotation torque_exact_angle", "refine_rotation cayley", "refine_rotation quest"}
+all_functions = pytest.mark.parametrize(
+    "function",
+    [
+        pytest.param(function, id=name, marks=[pytest.mark.exhaustive] if name in SELDOM else [])
+        for name, function in FUNCTIONS.items()
+    ],
+)
 all_lowered = pytest.mark.parametrize("function", LOWERED.values(), ids=LOWERED.keys())
 
 

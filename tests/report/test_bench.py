@@ -28,6 +28,7 @@ def measured():
         return bench.run_bench(size, steps.append), steps
 
 
+@pytest.mark.exhaustive
 def test_every_goal_is_measured_at_its_batch(measured):
     result, steps = measured
     assert steps == [f"bench: {name}" for name in bench.GROUPS]
@@ -62,6 +63,7 @@ def test_times_are_medians_a_matrix():
     assert result.nanoseconds == {"one, batch 8": pytest.approx(np.median(seconds["one"]) / 8 * 1e9)}
 
 
+@pytest.mark.exhaustive
 def test_the_stages_are_timed_and_what_breaks_without_them_is_named(measured):
     stages = {stage.name: stage for stage in measured[0].stages}
     assert set(stages) == {"", "inversion"}
@@ -76,6 +78,7 @@ def test_a_goal_is_met_on_its_own_side(median, at_least, met):
     assert row[-1] == met
 
 
+@pytest.mark.exhaustive
 def test_the_command_writes_and_prints_both_tables(measured, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(bench, "run_bench", lambda size, advance: measured[0])
     assert main(["report", "--bench", "--out", str(tmp_path / "out")]) == 0
