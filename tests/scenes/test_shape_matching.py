@@ -58,15 +58,16 @@ def points():
 
 def error_after_best_alignment(positions, rest):
     """In NumPy and float64, by its singular value decomposition."""
-    x, q = (np.asarray(array, np.float64) - np.mean(array, axis=0, dtype=np.float64) for array in (positions, rest))
+    x, q = (np.asarray(array, np.float64) for array in (positions, rest))
+    x, q = x - x.mean(axis=0), q - q.mean(axis=0)
     u, _, vt = np.linalg.svd(x.T @ q)
     rotation = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
     return np.sqrt(np.mean(np.sum((x - q @ rotation.T) ** 2, axis=1))) / np.linalg.norm(np.ptp(q, axis=0))
 
 
-def momenta(state, masses):
+def momenta(positions, velocities, masses):
     """Linear, and angular about the centre of mass, in float64."""
-    x, v, m = (np.asarray(array, np.float64) for array in (state.positions, state.velocities, masses[:, None]))
+    x, v, m = (np.asarray(array, np.float64) for array in (positions, velocities, masses[:, None]))
     centre = np.sum(m * x, axis=0) / np.sum(m)
     return np.sum(m * v, axis=0), np.sum(m * np.cross(x - centre, v), axis=0)
 
@@ -97,28 +98,19 @@ def test_both_momenta_are_kept_for_1000_free_steps_by_a_rotation_that_lags(drago
     start = spinning(body)
     after = roll_out(start, build_parameters(body, damping=1.0), 1000, **ROTATIONS["torque 1"])
     assert not np.allclose(after.positions, start.positions, atol=1)
-    for i in range(2):
-        parts = [
-            momenta(
-                *(
-                    jax.tree.map(
-                        lambda array: dragons.both(array)[i], (state._replace(rotations=body.masses), body.masses)
-                    )
-                )
-            )
-            for state in (start, after)
-        ]
-        assert max(relative_changes(*parts)) < 1e-5
+    vertices = [zip(*map(dragons.both, (*state[:2], body.masses)), strict=True) for state in (start, after)]
+    for before, later in zip(*vertices, strict=True):
+        assert max(relative_changes(momenta(*before), momenta(*later))) < 1e-5
 
 
 def test_without_the_correction_a_rotation_that_lags_brakes_and_one_that_has_converged_does_not(points):
     start = spinning(points)
     parameters = build_parameters(points)
-    before = momenta(start, points.masses)
+    before = momenta(*start[:2], points.masses)
     lags = roll_out(start, parameters, 1000, iterations=1, conserve_angular_momentum=False)
-    converged = roll_out(start, parameters, 1000, method="foam", conserve_angular_momentum=False)
-    assert relative_changes(before, momenta(lags, points.masses))[1] > 0.5
-    assert max(relative_changes(before, momenta(converged, points.masses))) < 1e-5
+    converged = roll_out(start, parameters, 1000, method="half_turn", conserve_angular_momentum=False)
+    assert relative_changes(before, momenta(*lags[:2], points.masses))[1] > 0.5
+    assert max(relative_changes(before, momenta(*converged[:2], points.masses))) < 1e-5
 
 
 @pytest.mark.parametrize(("stiffness", "period"), [(1.0, 6), (2 - 2**0.5, 8)])
@@ -164,11 +156,11 @@ def test_extreme_bodies_stay_finite_and_bounded():
     def move(state, of_case):
         def body(now, _):
             after = step(now, of_case)
-            return after, 0.5 * jnp.sum(of_case.body.masses[:, None] * after.velocities**2)
+            return after, jnp.sum(of_case.body.masses * jnp.sum(after.velocities**2, axis=-1)) / 2
 
         return jax.lax.scan(body, state, length=1000)
 
-    after, kinetic = jax.jit(jax.vmap(move))(*stacked)
+    after, kinetic = jax.tree.map(np.asarray, jax.jit(jax.vmap(move))(*stacked))
     for i, (shape, start, h) in enumerate(cases):
         message = f"{shape}, {start}, time step {h}"
         assert all(np.isfinite(array[i]).all() for array in after), message
@@ -183,25 +175,24 @@ def test_extreme_bodies_stay_finite_and_bounded():
 def test_a_rollout_gives_back_its_stiffness_and_first_velocity_by_gauss_newton():
     body = build_body(POINTS, CLUSTERS, dtype=np.float64)
     parameters = build_parameters(body, damping=0.1)
-    rest = build_state(body)
+    rest, sheared = build_state(body), jnp.asarray([[1.0, 2.0, 3.0]])
 
     def final(unknowns):
-        velocity = jnp.cross(jnp.broadcast_to(unknowns[1:], POINTS.shape), rest.positions) * jnp.asarray(
-            [1.0, 2.0, 3.0]
-        )
+        # Turning, and stretching too: a rigid motion would say nothing about the stiffness.
+        velocity = jnp.cross(jnp.broadcast_to(unknowns[1:], POINTS.shape), rest.positions) * sheared
         of_run = parameters._replace(stiffness=unknowns[0])
 
         def advance(state, _):
             return step(state, of_run, rotation_step="newton", iterations=2), None
 
-        return jax.lax.scan(advance, rest._replace(velocities=velocity), length=20)[0].positions.ravel()
+        return jax.lax.scan(advance, rest._replace(velocities=velocity), length=8)[0].positions.ravel()
 
     program = jax.jit(lambda unknowns: (final(unknowns), jax.jacfwd(final)(unknowns)))
     wanted = np.array([0.4, 1.0, -2.0, 0.5])
     target, jacobian = program(jnp.asarray(wanted))
     ahead, behind = (program(jnp.asarray(wanted + np.array([d, 0, 0, d])))[0] for d in (1e-5, -1e-5))
     np.testing.assert_allclose((ahead - behind) / 2e-5, jacobian[:, 0] + jacobian[:, 3], rtol=1e-5, atol=1e-7)
-    guess = np.array([0.8, 0.1, 0.1, 0.1])
+    guess = np.array([0.6, 0.1, 0.1, 0.1])
     for _ in range(12):
         value, jacobian = program(jnp.asarray(guess))
         guess = guess - np.linalg.lstsq(jacobian, value - target, rcond=None)[0]
@@ -210,33 +201,31 @@ def test_a_rollout_gives_back_its_stiffness_and_first_velocity_by_gauss_newton()
 
 def test_what_is_switched_off_is_not_in_the_program(points):
     state, parameters = build_state(points), build_parameters(points)
-    contacts = {"ground": True, "box": True, "obstacle": True}
-    choices = [
-        {"method": "jacobi_svd", **contacts},
-        {**contacts},
-        {"ground": True, "box": True},
-        {"ground": True},
-        {},
-        {"damping": False},
-        {"damping": False, "conserve_angular_momentum": False},
-        {"damping": False, "conserve_angular_momentum": False, "iterations": 0},
+    least = {"damping": False, "conserve_angular_momentum": False}
+    chains = [
+        [{}, {"damping": False}, least, {**least, "iterations": 0}],
+        [{**least, "ground": True, "box": True, "obstacle": True}, {**least, "ground": True, "box": True}],
+        [{**least, "ground": True, "box": True}, {**least, "ground": True}, least],
     ]
-    counts = [flops(functools.partial(step, **choice), state, parameters) for choice in choices]
-    assert all(less < more for more, less in itertools.pairwise(counts)), counts
+    count = functools.cache(lambda choices: flops(functools.partial(step, **dict(choices)), state, parameters))
+    for chain in chains:
+        counts = [count(tuple(choices.items())) for choices in chain]
+        assert all(less < more for more, less in itertools.pairwise(counts)), counts
 
 
 def test_scenes_are_carries_of_scan_with_finite_health_and_the_drop_stays_in_its_room():
     mesh = POINTS * [1.0, 0.5, 0.7]
     for scene in (dragon(mesh), drop(mesh)):
-        after, path = jax.jit(
-            lambda state, scene=scene: jax.lax.scan(
-                lambda s, _: (scene.step(s), scene.points(s)), state, length=scene.steps
-            )
-        )(scene.state)
+
+        def advance(state, _, scene=scene):
+            return scene.step(state), scene.points(state)
+
+        after, path = jax.lax.scan(advance, scene.state, length=scene.steps)
+        path = np.asarray(path)
         assert path.shape == (scene.steps, 24, 3)
         assert jax.tree.map(lambda x: x.dtype, after) == jax.tree.map(lambda x: x.dtype, scene.state)
         if scene.title.startswith("Body"):
-            health = scene.health(after)
+            health = jax.jit(scene.health)(after)
             assert all(np.isfinite(value) for value in health.values())
             assert health["shape error (of the diagonal)"] < 0.01
             assert health["worst orthogonality"] < 2e-6
