@@ -150,9 +150,12 @@ def step(
         ValueError: Unknown step, method or derivative, negative iterations.
 
     Conservation:
-        Linear momentum always, angular momentum where `conserve_angular_momentum` is on or the rotations have
-        converged; both to rounding, about 1e-6 in 1,000 steps in float32. Not of energy: damping takes it; undamped it
-        is bounded while the rotations converge, and a lagging rotation may pump.
+        Of linear momentum always, of angular momentum with `conserve_angular_momentum`: both to 1e-6 in 1,000 free
+        steps in float32. Without it to 2e-5 where the rotations converge. Not of energy: damping takes it; undamped
+        its mean stays where the rotations converge, and a rotation that lags may pump.
+
+    Limits:
+        A `method` that is not for singular matrices gives NaN for a cluster of one vertex, on a line or in a plane.
 
     Derivative:
         Forward and reverse, with respect to the state and the parameters. That of the rotation is right where it has
