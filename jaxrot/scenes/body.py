@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot.scenes.clusters import covering_clusters, incidence, padded, spread_clusters
+from jaxrot.scenes.clusters import incidence, padded, two_scale_clusters
 
 
 class Body(NamedTuple):
@@ -84,7 +84,7 @@ def build_body(
 def build_two_scale_body(
     rest_vertices: ArrayLike, masses: ArrayLike | None = None, *, cluster_size: int = 32, dtype: type = np.float32
 ) -> Body:
-    """The body in clusters of neighbours, two for every vertex on average, and one of vertices from all over it.
+    """The body in clusters of neighbours, two for every vertex on average, and of vertices from all over it.
 
     Args:
         rest_vertices: Shape (n, 3), m.
@@ -100,9 +100,7 @@ def build_two_scale_body(
     if cluster_size < 1:
         raise ValueError(f"cluster_size must be positive; got {cluster_size}")
     vertices = checked_vertices(rest_vertices)
-    size = min(cluster_size, len(vertices))
-    neighbours = covering_clusters(vertices, -(-2 * len(vertices) // size) if size > 1 else len(vertices), size)
-    return build_body(vertices, [*neighbours, *spread_clusters(len(vertices), size)], masses, dtype=dtype)
+    return build_body(vertices, two_scale_clusters(vertices, cluster_size), masses, dtype=dtype)
 
 
 def checked_vertices(vertices: ArrayLike, name: str = "vertices") -> np.ndarray:

@@ -74,6 +74,21 @@ def spread_clusters(vertex_count: int, size: int) -> list[np.ndarray]:
     return [order[row::count] for row in range(count)]
 
 
+def two_scale_clusters(vertices: np.ndarray, size: int) -> list[np.ndarray]:
+    """Clusters of neighbours, two for every vertex on average and one at least, and one of vertices from all over.
+
+    Args:
+        vertices: Shape (n, 3).
+        size: Vertices in a cluster, > 0; all where there are fewer.
+
+    Returns:
+        Vertex indices of every cluster, those of neighbours first.
+    """
+    size = min(size, len(vertices))
+    count = min(len(vertices), -(-2 * len(vertices) // size))
+    return [*covering_clusters(vertices, count, size), *spread_clusters(len(vertices), size)]
+
+
 def padded(
     clusters: Sequence[Sequence[int] | np.ndarray] | np.ndarray, vertex_count: int
 ) -> tuple[np.ndarray, np.ndarray]:

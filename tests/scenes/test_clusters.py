@@ -3,7 +3,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from jaxrot.scenes.clusters import overlapping_clusters
+from jaxrot.scenes.clusters import covering_clusters, incidence, overlapping_clusters, padded, spread_clusters
 from jaxrot.scenes.dragon import rest_vertices
 
 SIZE = 32
@@ -38,3 +38,27 @@ def test_a_cluster_holds_the_nearest_vertices(vertices):
     row = overlapping_clusters(vertices, 5, SIZE)[4]
     distance = np.linalg.norm(vertices - vertices[row[0]], axis=1)
     assert np.max(distance[row]) <= np.min(np.delete(distance, row))
+
+
+def test_covering_clusters_hold_every_vertex():
+    points = np.random.default_rng(0).standard_normal((300, 3)) ** 3
+    assert len(np.unique(overlapping_clusters(points, 30, 20))) < 300
+    clusters = covering_clusters(points, 30, 20)
+    assert set(clusters.ravel().tolist()) == set(range(300))
+    np.testing.assert_array_equal(clusters[:30], overlapping_clusters(points, 30, 20))
+
+
+def test_spread_clusters_hold_every_vertex_once():
+    clusters = spread_clusters(100, 32)
+    assert sorted(np.concatenate(clusters).tolist()) == list(range(100))
+    assert {len(cluster) for cluster in clusters} == {25}
+
+
+def test_incidence_is_the_table_of_clusters_the_other_way_round():
+    members, filled = padded([[3, 1, 0], [1], [2, 1]], 4)
+    places, counts = incidence(members, filled, 4)
+    assert counts.tolist() == [1, 3, 1, 1]
+    for vertex, row in enumerate(places.tolist()):
+        found = [place for place in row if place < members.size]
+        assert len(found) == counts[vertex]
+        assert all(members.ravel()[place] == vertex and filled.ravel()[place] for place in found)
