@@ -27,7 +27,7 @@ _SHOWN = (
     (DEFAULT_METHOD, DEFAULT_METHOD, 1),
 )
 _PRODUCTS = 1000  # a frame of `drift`
-_MAGNIFIED = 20  # the deviation in its pictures: without repair it is a twentieth of the axes at the end
+_MAGNIFIED = 50  # the deviation in its pictures: without repair it is a twentieth of the axes at the end
 
 
 class State(NamedTuple):
@@ -142,7 +142,7 @@ def orthonormality_error(state: State) -> jax.Array:
 def drift() -> Scene:
     """A tumbling top, five times beside the exact one: without repair, and with four. A step is 1,000 products.
 
-    The picture shows the axes of each, their deviation from the exact axes (drawn above) magnified 20 times.
+    The picture shows the axes of each, their deviation from the exact axes (drawn above) magnified 50 times.
     """
     rates, time_step = tumbling_rates((1.0, 2.0, 3.0), (0.05, 1.0, 0.05), 500)
     start, parameters = build(rates, time_step)

@@ -72,7 +72,7 @@ def test_taylor_keeps_orthonormality_and_the_random_walk_of_rounding(bodies, eve
     assert orthonormality < 3 * EPS
 
 
-def test_gram_schmidt_turns_a_steady_body_by_the_same_rounding_every_step(bodies):
+def test_gram_schmidt_drifts_from_a_steady_body_in_proportion_to_the_steps(bodies):
     few, many = (_errors(bodies, "gram_schmidt", steps=steps) for steps in (STEPS // 10, STEPS))
     # Random rounding would grow by √10.
     assert many[0][1] > 6 * few[0][1]
@@ -122,7 +122,7 @@ def test_the_scene_runs():
     points = jax.jit(scene.points)(state)
     assert points.shape == (np.max(scene.lines) + 1, 3)
     lengths = np.linalg.norm(points[scene.lines[:, 1]] - points[scene.lines[:, 0]], axis=-1)
-    np.testing.assert_allclose(lengths, 1, atol=0.01)
+    np.testing.assert_allclose(lengths, 1, atol=0.02)
     health = jax.jit(scene.health)(state)
     assert all(float(value) < 1e-4 for value in health.values())
     assert float(health["orthonormality error, no repair (1)"]) > 10 * EPS
