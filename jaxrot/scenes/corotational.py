@@ -90,7 +90,7 @@ def build(
     _check_positive("young", young)
     _check_positive("density", density)
     _check_positive("time_step", time_step)
-    if not -1 < np.dtype(dtype).type(poisson) < 0.5:
+    if not -1 < poisson < 0.5:
         raise ValueError(f"poisson must be above -1 and below 1/2; got {poisson}")
     if not (np.isfinite(damping) and damping >= 0):
         raise ValueError(f"damping must be finite and >= 0; got {damping}")
@@ -105,15 +105,14 @@ def build(
     def array(values: ArrayLike) -> jax.Array:
         return jnp.asarray(values, dtype)
 
-    modulus = array(np.broadcast_to(young, (count,)))
-    shear_modulus, lame_first = elasticity.lame_parameters(modulus, array(poisson))
+    shear_modulus, lame_first = elasticity.lame_parameters(np.broadcast_to(young, (count,)), poisson)
     elements = Elements(
         corners=jnp.asarray(mesh.tetrahedra),
         incidence=jnp.asarray(meshes.incidence(mesh)),
         rest_inverses=array(np.linalg.inv(meshes.edge_matrices(mesh))),
         volumes=array(meshes.volumes(mesh)),
-        shear_modulus=shear_modulus,
-        lame_first=lame_first,
+        shear_modulus=array(shear_modulus),
+        lame_first=array(lame_first),
     )
     parameters = Parameters(
         elements=elements,

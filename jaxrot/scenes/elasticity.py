@@ -9,11 +9,10 @@ and Kim 2019 (the eigenvalues of its Hessian).
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, twist_modes
 
@@ -39,9 +38,8 @@ class Elements(NamedTuple):
     lame_first: jax.Array
 
 
-def lame_parameters(young: ArrayLike, poisson: ArrayLike) -> tuple[jax.Array, jax.Array]:
-    """(μ, λ) from Young's modulus, Pa, and Poisson's ratio."""
-    young, poisson = jnp.asarray(young), jnp.asarray(poisson)
+def lame_parameters(young: Any, poisson: Any) -> tuple[Any, Any]:
+    """(μ, λ) from Young's modulus, Pa, and Poisson's ratio: numbers, or arrays of NumPy or JAX."""
     return young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
 
 
