@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 from jaxrot import METHODS, STEPS
+from jaxrot.simulate.catalogue import SCENES
 
 ROOT = pathlib.Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -31,6 +32,11 @@ def test_the_readme_has_one_command_for_the_report_and_one_for_the_tests():
 def test_the_tables_name_every_method_and_step():
     rows = set(re.findall(r"^\| `(\w+)`", README, re.MULTILINE))
     assert set(METHODS) | set(STEPS) <= rows
+
+
+def test_every_scene_is_in_the_table():
+    table = " ".join(line for line in README.splitlines() if line.startswith("| `"))
+    assert all(f"`{name}`" in table for name in SCENES)
 
 
 def test_its_pictures_exist():
