@@ -115,6 +115,7 @@ def test_a_free_top_keeps_energy_and_momentum_and_comes_back():
     np.testing.assert_allclose(slow_step, 7 * time_step)
 
 
+@pytest.mark.exhaustive
 def test_the_scene_runs():
     scene = drift.drift()
     assert jax.eval_shape(scene.step, scene.state) == jax.eval_shape(lambda s: s, scene.state)

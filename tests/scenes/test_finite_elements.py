@@ -11,6 +11,7 @@ from jaxrot.scenes.tetrahedra import box
 SMALL = box((3, 1, 1), (3.0, 1.0, 1.0))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["cantilever", "recovery"])
 def test_a_scene_runs_on_a_mesh_of_the_users(name):
     make = getattr(finite_elements, name)

@@ -217,6 +217,7 @@ def test_what_is_switched_off_is_not_in_the_program(points):
         assert all(less < more for more, less in itertools.pairwise(counts)), counts
 
 
+@pytest.mark.exhaustive
 def test_scenes_are_carries_of_scan_with_finite_health_and_the_drop_stays_in_its_room():
     mesh = POINTS * [1.0, 0.5, 0.7]
     for scene in (dragon(mesh), drop(mesh)):

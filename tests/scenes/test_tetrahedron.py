@@ -97,6 +97,7 @@ def test_what_is_switched_off_is_not_in_the_program():
     assert warm > cold + 120
 
 
+@pytest.mark.exhaustive
 def test_the_scene_runs_to_its_end():
     scene = tetrahedron.tetrahedron()
     last = jax.jit(lambda state: jax.lax.fori_loop(0, scene.steps + 5, lambda _, s: scene.step(s), state))(scene.state)
