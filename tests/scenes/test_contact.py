@@ -10,7 +10,7 @@ BOX = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
 
 def moved(answer, position, velocity, **contact):
     motion = Motion(jnp.asarray([position], jnp.float32), jnp.asarray([velocity], jnp.float32))
-    after = answer(motion, build_contact(**contact))
+    after = jax.jit(answer)(motion, build_contact(**contact))
     assert {array.dtype for array in after} == {jnp.float32.dtype}
     return [np.asarray(array[0]).tolist() for array in after]
 
@@ -54,8 +54,8 @@ def test_what_is_not_given_is_touched_nowhere_and_has_a_finite_derivative():
         return motion
 
     position = jnp.asarray([[1.0, -2.0, 3.0]], jnp.float32)
-    assert (after(position).positions == position).all()
-    gradient = jax.grad(lambda x: jnp.sum(after(x).velocities))(position)
+    assert (jax.jit(after)(position).positions == position).all()
+    gradient = jax.jit(jax.grad(lambda x: jnp.sum(after(x).velocities)))(position)
     np.testing.assert_array_equal(gradient, jnp.full((1, 3), 2, jnp.float32))
 
 

@@ -12,7 +12,6 @@ from jaxrot.scenes.clusters import two_scale_clusters
 from jaxrot.scenes.dragon import dragon, rest_vertices
 from jaxrot.scenes.drop import BLOCK, ROOM, drop
 from jaxrot.scenes.scene import flops
-from jaxrot.scenes.shape_health import shape_error
 from jaxrot.scenes.shape_matching import build_parameters, build_state, step
 
 ROTATIONS = {
@@ -108,11 +107,11 @@ def test_without_the_correction_a_rotation_that_lags_brakes_and_one_that_has_con
     parameters = build_parameters(points)
     before = momenta(*start[:2], points.masses)
     lags = roll_out(start, parameters, 1000, iterations=1, conserve_angular_momentum=False)
-    converged = roll_out(start, parameters, 1000, method="half_turn", conserve_angular_momentum=False)
+    converged = roll_out(start, parameters, 1000, rotation_step="newton", iterations=2, conserve_angular_momentum=False)
     assert relative_changes(before, momenta(*lags[:2], points.masses))[1] > 0.5
     linear, angular = relative_changes(before, momenta(*converged[:2], points.masses))
     assert linear < 1e-5
-    assert angular < 1e-4
+    assert angular < 2e-4
 
 
 @pytest.mark.parametrize(("stiffness", "period"), [(1.0, 6), (2 - 2**0.5, 8)])
@@ -187,16 +186,17 @@ def test_a_rollout_gives_back_its_stiffness_and_first_velocity_by_gauss_newton()
         def advance(state, _):
             return step(state, of_run, rotation_step="newton", iterations=2), None
 
-        return jax.lax.scan(advance, rest._replace(velocities=velocity), length=8)[0].positions.ravel()
+        positions = jax.lax.scan(advance, rest._replace(velocities=velocity), length=8)[0].positions.ravel()
+        return positions, positions
 
-    program = jax.jit(lambda unknowns: (final(unknowns), jax.jacfwd(final)(unknowns)))
+    program = jax.jit(jax.jacfwd(final, has_aux=True))
     wanted = np.array([0.4, 1.0, -2.0, 0.5])
-    target, jacobian = program(jnp.asarray(wanted))
-    ahead, behind = (program(jnp.asarray(wanted + np.array([d, 0, 0, d])))[0] for d in (1e-5, -1e-5))
+    jacobian, target = program(jnp.asarray(wanted))
+    ahead, behind = (program(jnp.asarray(wanted + np.array([d, 0, 0, d])))[1] for d in (1e-5, -1e-5))
     np.testing.assert_allclose((ahead - behind) / 2e-5, jacobian[:, 0] + jacobian[:, 3], rtol=1e-5, atol=1e-7)
     guess = np.array([0.6, 0.1, 0.1, 0.1])
     for _ in range(12):
-        value, jacobian = program(jnp.asarray(guess))
+        jacobian, value = program(jnp.asarray(guess))
         guess = guess - np.linalg.lstsq(jacobian, value - target, rcond=None)[0]
         # With the velocity still wrong the first step leads anywhere.
         guess[0] = np.clip(guess[0], 0, 1)
@@ -207,9 +207,8 @@ def test_what_is_switched_off_is_not_in_the_program(points):
     state, parameters = build_state(points), build_parameters(points)
     least = {"damping": False, "conserve_angular_momentum": False}
     chains = [
-        [{}, {"damping": False}, least, {**least, "iterations": 0}],
-        [{**least, "ground": True, "box": True, "obstacle": True}, {**least, "ground": True, "box": True}],
-        [{**least, "ground": True, "box": True}, {**least, "ground": True}, least],
+        [{}, {"damping": False}, least],
+        [{**least, "ground": True, "box": True, "obstacle": True}, {**least, "ground": True}, least],
     ]
     count = functools.cache(lambda choices: flops(functools.partial(step, **dict(choices)), state, parameters))
     for chain in chains:
@@ -230,10 +229,14 @@ def test_scenes_are_carries_of_scan_with_finite_health_and_the_drop_stays_in_its
         assert path.shape == (scene.steps, 24, 3)
         assert jax.tree.map(lambda x: x.dtype, after) == jax.tree.map(lambda x: x.dtype, scene.state)
         if scene.title.startswith("Body"):
-            health = jax.jit(scene.health)(after)
+            watched = jax.jit(scene.health)
+            first, health = watched(scene.state), watched(after)
             assert all(np.isfinite(value) for value in health.values())
             assert health["shape error (of the diagonal)"] < 0.01
             assert health["worst orthogonality"] < 2e-6
+            expected = error_after_best_alignment(scene.state.positions, mesh)
+            assert first["shape error (of the diagonal)"] == pytest.approx(expected, rel=1e-5)
+            assert first["elastic energy (J)"] > 1e3 * health["elastic energy (J)"]
         else:
             lower, upper = np.asarray(BLOCK, np.float32)
             assert (path >= np.asarray(ROOM[0], np.float32)).all()
@@ -242,10 +245,8 @@ def test_scenes_are_carries_of_scan_with_finite_health_and_the_drop_stays_in_its
             assert path[-1, :, 2].min() < 0.3
 
 
-def test_shape_error_is_that_after_the_best_alignment():
-    moved = POINTS @ np.linalg.qr(POINTS[:3])[0].T + 5 + 0.1 * POINTS[::-1]
-    expected = error_after_best_alignment(moved, POINTS)
-    assert shape_error(jnp.asarray(moved), jnp.asarray(POINTS)) == pytest.approx(expected)
+def refused(body, **choices):
+    return jax.eval_shape(functools.partial(step, **choices), build_state(body), build_parameters(body))
 
 
 @pytest.mark.parametrize(
@@ -267,8 +268,8 @@ def test_shape_error_is_that_after_the_best_alignment():
         ("gravity", lambda body: build_parameters(body, gravity=(0.0, np.inf, 0.0))),
         ("positions", lambda body: build_state(body, POINTS[1:])),
         ("velocities", lambda body: build_state(body, POINTS, np.inf * POINTS)),
-        ("step must be one of", lambda body: step(build_state(body), build_parameters(body), rotation_step="none")),
-        ("method must be one of", lambda body: step(build_state(body), build_parameters(body), method="none")),
+        ("step must be one of", lambda body: refused(body, rotation_step="none")),
+        ("method must be one of", lambda body: refused(body, method="none")),
         ("all be in one place", lambda body: drop(np.ones((5, 3)))),
         ("shape", lambda body: dragon(np.ones((0, 3)))),
     ],
