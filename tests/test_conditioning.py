@@ -41,6 +41,7 @@ FIRST = jax.jit(jax.jacrev(rotation_gap))
 
 
 @pytest.mark.parametrize("matrix", DISTINCT.values(), ids=DISTINCT.keys())
+@pytest.mark.exhaustive
 def test_the_derivative_is_right_where_singular_values_differ(matrix):
     assert_is_derivative(FIRST, jax.jit(rotation_gap), matrix)
 

@@ -43,6 +43,7 @@ def assert_kept(matrices):
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.exhaustive
 def test_the_contract_holds_with_a_margin_of_two_on_many_matrices_of_every_family(dtype):
     """LAPACK in float32 is up to 11 eps (1 + κ) off; a third of that is less than the 4 asked here.
 

@@ -83,6 +83,7 @@ def test_the_hessian_is_that_of_automatic_differentiation_and_its_projection(mat
 
 
 @pytest.mark.parametrize("matrix", [2 * np.eye(3), np.eye(3) + POINTS["generic"], 0.8 * POINTS["equal"]])
+@pytest.mark.exhaustive
 def test_the_derivative_of_the_hessian_is_right_at_equal_singular_values_too(matrix):
     """Nothing is projected, nothing with singular values that differ, two of three sums are above 2."""
     assert_is_derivative(jax.jit(jax.jacfwd(arap_hessian)), jax.jit(arap_hessian), matrix)

@@ -53,6 +53,7 @@ SECOND = jax.jit(jax.jacfwd(jax.jacrev(stretch)))
 
 
 @pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+@pytest.mark.exhaustive
 def test_the_derivatives_of_the_stretch_are_exact_at_equal_singular_values_too(matrix):
     assert_is_derivative(FIRST, jax.jit(stretch), matrix)
     assert_is_derivative(SECOND, FIRST, matrix)

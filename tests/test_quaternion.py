@@ -109,6 +109,7 @@ def test_the_exponential_has_finite_and_right_derivatives_to_third_order(vector)
     "quaternion",
     [(1.0, 0, 0, 0), (1, 1e-9, 0, 0), (1, 0.02, 0.1, 0), (0, 1, 0, 0), (1e-9, 0, 0.6, 0.8), (0.5, 0.5, -0.5, 0.5)],
 )
+@pytest.mark.exhaustive
 def test_the_logarithm_has_finite_and_right_derivatives_to_second_order(quaternion):
     quaternion = np.array(quaternion, float)
     first = jax.jacrev(logarithm)
@@ -160,6 +161,7 @@ SECOND = jax.jit(jax.jacfwd(jax.jacrev(nearest_quaternion_wxyz)))
 
 
 @pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+@pytest.mark.exhaustive
 def test_the_derivatives_of_the_nearest_quaternion_are_right(matrix):
     # From a half turn, where w jumps, a little off.
     for turn in (np.eye(3), turned([1, 2, 3], 3.0)):

@@ -87,6 +87,7 @@ VALUES_SECOND = jax.jit(jax.jacfwd(jax.jacrev(signed_singular_values)))
 
 
 @distinct
+@pytest.mark.exhaustive
 def test_the_derivatives_are_right_where_singular_values_differ(matrix):
     assert_is_derivative(lambda a: FIRST_AND_FACTORS(a)[0], lambda a: FIRST_AND_FACTORS(a)[1], matrix)
     assert_is_derivative(VALUES_FIRST, jax.jit(signed_singular_values), matrix)

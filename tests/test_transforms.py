@@ -112,6 +112,7 @@ def test_the_matmul_precision_setting_changes_nothing(method):
         np.testing.assert_array_equal(np.asarray(jax.jit(lambda a: function(a))(A)), expected)
 
 
+@pytest.mark.exhaustive
 def test_it_works_inside_control_flow():
     expected = np.asarray(nearest_rotation(A))
     wrapped = {

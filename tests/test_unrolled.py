@@ -48,6 +48,7 @@ def test_the_unrolled_derivative_is_that_of_the_iterations_that_were_run(step, e
     np.testing.assert_allclose(np.einsum("ijkl,nkl->ijn", reverse[1], turns), by_start, atol=1e-7 * size)
 
 
+@pytest.mark.exhaustive
 def test_the_unrolled_derivative_is_the_same_forward_and_reverse():
     matrices, starts, tangent = (RANDOM.standard_normal((7, 3, 3)) for _ in range(3))
     function = functools.partial(refine_rotation, derivative="unrolled")

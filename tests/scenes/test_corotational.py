@@ -102,6 +102,7 @@ def test_a_cantilever_bends_as_euler_and_bernoulli_say():
     assert deflection / (load * length**4 / (8 * 1e7 / 12)) == pytest.approx(1, abs=0.03)
 
 
+@pytest.mark.exhaustive
 def test_the_midpoint_rule_keeps_the_energy_and_the_momenta():
     state, parameters = build(*BLOCK, young=1e5, gravity=NO_GRAVITY, dtype="float64")
     spin = np.random.default_rng(0).normal(size=(3, 3))
@@ -166,6 +167,7 @@ def test_a_block_recovers_its_shape_with_every_element_upright(start):
     np.testing.assert_allclose(np.linalg.svd(gradients)[1], 1, atol=1e-3)
 
 
+@pytest.mark.exhaustive
 def test_newton_needs_fewer_iterations_with_the_exact_tangent():
     mesh = box((6, 1, 1), (6.0, 1.0, 1.0))
     state, parameters = build(*mesh, young=1e6, time_step=0.05, fixed=mesh.vertices[:, 0] == 0, dtype="float64")
@@ -181,6 +183,7 @@ def test_newton_needs_fewer_iterations_with_the_exact_tangent():
     assert needed["held"] >= needed["exact"] + 3
 
 
+@pytest.mark.exhaustive
 def test_a_rollout_is_differentiable_and_finds_the_stiffness_of_a_final_shape():
     mesh = box((4, 1, 1), (4.0, 1.0, 1.0))
     fixed = mesh.vertices[:, 0] == 0
@@ -214,6 +217,7 @@ def test_a_rollout_is_differentiable_and_finds_the_stiffness_of_a_final_shape():
     assert now == pytest.approx(5.0, rel=1e-4)
 
 
+@pytest.mark.exhaustive
 def test_static_choices_leave_out_what_they_switch_off():
     state, parameters = build(*BLOCK, young=1e5, dtype="float32")
 

@@ -171,6 +171,7 @@ def test_extreme_bodies_stay_finite_and_bounded():
         assert np.abs(orthogonality).max() < 2e-6, message
 
 
+@pytest.mark.exhaustive
 def test_a_rollout_gives_back_its_stiffness_and_first_velocity_by_gauss_newton():
     body = build_body(POINTS, CLUSTERS, dtype=np.float64)
     parameters = build_parameters(body, damping=0.1)

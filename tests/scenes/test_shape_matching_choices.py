@@ -19,6 +19,7 @@ def points():
     return build_body(POINTS, [range(16), range(8, 24)])
 
 
+@pytest.mark.exhaustive
 def test_what_is_switched_off_is_not_in_the_program(points):
     state, parameters = build_state(points), build_parameters(points)
     least = {"damping": False, "conserve_angular_momentum": False}
