@@ -45,6 +45,7 @@ def test_several_arrays_and_several_results_are_split_alike(size):
 
 
 @pytest.mark.parametrize("size", [250, 300])
+@pytest.mark.exhaustive
 def test_both_modes_of_differentiation_go_through(size):
     blocked = in_blocks(nearest, size)
     weights = np.random.default_rng(1).standard_normal(A.shape)

@@ -46,6 +46,7 @@ def test_the_derivative_is_right_where_singular_values_differ(matrix):
     assert_is_derivative(FIRST, jax.jit(rotation_gap), matrix)
 
 
+@pytest.mark.exhaustive
 def test_the_derivative_scales_with_the_matrix_bit_for_bit():
     matrix = DISTINCT["generic"].astype(np.float32)
     expected = np.asarray(FIRST(matrix))

@@ -95,6 +95,7 @@ def test_what_is_compressed_has_no_curvature_along_its_twists():
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.exhaustive
 def test_the_projected_hessian_is_semidefinite_on_every_family(dtype):
     batch = family_batch(dtype)
     hessian = np.asarray(jax.jit(arap_hessian)(batch.matrices)).astype(np.float64)

@@ -141,7 +141,7 @@ def test_a_start_of_the_wrong_shape_is_refused():
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("dtype", ["float32", pytest.param("float64", marks=pytest.mark.exhaustive)])
 def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(value, dtype):
     clean = A.astype(dtype)
     for function in map(jax.jit, COMPUTED.values()):

@@ -78,6 +78,7 @@ def test_forward_and_reverse_are_transposes():
     np.testing.assert_allclose(np.sum(forward * cotangent), np.sum(reverse * tangent), rtol=1e-12)
 
 
+@pytest.mark.exhaustive
 def test_the_rotation_alone_leaves_the_stretch_out():
     matrices = np.random.default_rng(0).standard_normal((1000, 3, 3)).astype(np.float32)
     functions = (lambda a: polar_decomposition(a).rotation, polar_decomposition)

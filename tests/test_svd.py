@@ -41,6 +41,7 @@ def test_the_factors_make_the_nearest_rotation(dtype):
     assert_within(difference[where].max((1, 2)), 32 * np.finfo(dtype).eps, batch.families[where], "left · rightᵀ")
 
 
+@pytest.mark.exhaustive
 def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
     matrices = np.random.default_rng(0).standard_normal((1000, 3, 3)).astype(np.float32)
 
@@ -54,6 +55,7 @@ def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.exhaustive
 def test_singular_values_alone_are_right_near_rank_one(dtype):
     """What decides between the axes of two nearly equal eigenvalues must decide alike for both."""
     random = np.random.default_rng(0)

@@ -63,6 +63,7 @@ def test_the_unrolled_derivative_is_the_same_forward_and_reverse():
     np.testing.assert_allclose(*both(matrices, np.asarray(nearest_rotation(starts))), rtol=1e-12)
 
 
+@pytest.mark.exhaustive
 def test_both_derivatives_agree_at_convergence_and_not_before():
     matrix = POINTS["generic"]
     start = np.asarray(nearest_rotation(matrix)) @ turned([1, 2, 3], 0.5)

@@ -42,6 +42,7 @@ def random_elements():
     return np.asarray(stress), np.asarray(of_energy) / np.asarray(elements.volumes)[:, None, None], *dense
 
 
+@pytest.mark.exhaustive
 def test_the_force_with_rotations_held_is_the_derivative_of_the_energy():
     stress, of_energy, *_ = random_elements()
     np.testing.assert_allclose(stress, of_energy, atol=1e-9 * np.abs(stress).max())
