@@ -72,6 +72,7 @@ def test_the_twist_modes_are_the_eigenvectors_of_the_jacobian():
 
 
 @points
+@pytest.mark.exhaustive
 def test_the_hessian_is_that_of_automatic_differentiation_and_its_projection(matrix):
     plain = np.asarray(arap_hessian(matrix, psd=False))
     np.testing.assert_allclose(plain, np.asarray(HESSIAN(matrix)).reshape(9, 9), atol=1e-13)

@@ -143,6 +143,11 @@ THIRD_ALONG = jax.jit(lambda a, tangent: jax.jvp(jax.jacfwd(jax.jacrev(nearest_r
 def test_the_derivative_of_each_order_is_that_of_the_lower_one(matrix):
     assert_is_derivative(FIRST, jax.jit(nearest_rotation), matrix)
     assert_is_derivative(SECOND, FIRST, matrix)
+
+
+@pytest.mark.exhaustive
+@points
+def test_the_third_derivative_is_that_of_the_second(matrix):
     tangent = np.array([[0.3, -0.5, 0.2], [0.7, 0.1, -0.4], [-0.6, 0.2, 0.5]])
     got = np.asarray(THIRD_ALONG(matrix, tangent))
     np.testing.assert_allclose(got, central_difference(SECOND, matrix, tangent), atol=2e-8 * max(1, np.abs(got).max()))
@@ -184,6 +189,7 @@ def test_the_derivative_is_scale_free_bit_for_bit(dtype, exponent):
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.exhaustive
 def test_the_second_derivative_scales_too(dtype):
     matrix = POINTS["generic"].astype(dtype)
     expected = np.asarray(SECOND(matrix))
@@ -194,6 +200,7 @@ def test_the_second_derivative_scales_too(dtype):
 
 @pytest.mark.parametrize("mode", ["forward", "reverse"])
 @pytest.mark.parametrize("damping", [1e-2, 1.0])
+@pytest.mark.exhaustive
 def test_damping_is_relative_and_leaves_the_value_alone(mode, damping):
     batch = family_batch("float64")
     where = np.isin(batch.families, ["gaussian", "rank_one", "inversion", "scale_large", "minus_identity"])

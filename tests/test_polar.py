@@ -67,6 +67,7 @@ def test_the_derivative_of_the_stretch_does_not_depend_on_the_scale():
         np.testing.assert_array_equal(FIRST(np.ldexp(matrix, exponent)), expected)
 
 
+@pytest.mark.exhaustive
 def test_forward_and_reverse_are_transposes():
     matrices, tangent, cotangent = np.random.default_rng(1).standard_normal((3, 20, 3, 3))
 

@@ -142,6 +142,7 @@ def test_the_derivative_is_implicit_and_forgets_the_start():
         np.testing.assert_array_equal(by_start, np.zeros((3, 3, 3, 3)))
 
 
+@pytest.mark.exhaustive
 def test_the_quaternion_has_the_derivative_of_the_rotation():
     matrix = np.diag([1.0, 0.9, 0.8]) + 0.1 * RANDOM.standard_normal((3, 3))
     function = lambda a: refine_quaternion_wxyz(a, np.eye(4)[0], iterations=60)  # noqa: E731

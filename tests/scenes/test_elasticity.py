@@ -49,6 +49,7 @@ def test_the_force_with_rotations_held_is_the_derivative_of_the_energy():
     np.testing.assert_allclose(stress, of_energy, atol=1e-9 * np.abs(stress).max())
 
 
+@pytest.mark.exhaustive
 def test_the_projected_tangent_is_the_exact_one_without_its_negative_eigenvalues():
     _, _, exact, projected, held = random_elements()
     np.testing.assert_allclose(exact, exact.swapaxes(1, 2), atol=1e-8 * np.abs(exact).max())

@@ -19,6 +19,7 @@ EXTREME = ["near_tie", "ill_conditioned", "minus_rotation_1e-1", "small_integers
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.exhaustive
 def test_every_half_turn_start_and_its_neighbours_are_left_for_the_nearest_rotation(dtype):
     samples = [FAMILIES[name].sample(24, dtype=np.dtype(dtype), seed=3).matrices for name in ORDINARY + EXTREME]
     matrices = np.concatenate(samples)
