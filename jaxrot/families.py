@@ -26,7 +26,7 @@ class Sample(NamedTuple):
         singular_values: Shape (count, 3), float64, signed. A prescribed spectrum is that of U diag(s) Vᵀ before its one
             rounding to dtype, which moves it by at most 2 eps s1 (and the spacing of subnormals): a gap s2 + s3 below
             that is the one intended. Others are LAPACK's, off by 18 float64 eps s1 at worst. For the rounded matrix to
-            the last digit see `jaxrot.report.reference`.
+            the last digit see `jaxrot.measuring.reference`.
     """
 
     matrices: NDArray[np.floating]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 
 # The contract of the default method, in units of eps.
 FORWARD = 8  # times (1 + kappa), for kappa < 1/(8 eps)

@@ -11,7 +11,7 @@ from certificate import Batch, assert_contract, assert_forward_error, family_bat
 from hypothesis import strategies
 
 from jaxrot import nearest_rotation
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.solvers import half_turn
 
 DTYPES = ["float32", "float64"]

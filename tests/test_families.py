@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxrot.families import FAMILIES, LARGE_BATCH, Family, half_turn_starts, poison
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 
 DTYPES = (np.float32, np.float64)
 COUNT = 96

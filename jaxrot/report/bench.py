@@ -9,9 +9,9 @@ import numpy as np
 
 import jaxrot
 from jaxrot.families import FAMILIES
-from jaxrot.report.accuracy import measure_errors
-from jaxrot.report.judging import judge
-from jaxrot.report.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
+from jaxrot.measuring.accuracy import measure_errors
+from jaxrot.measuring.judging import judge
+from jaxrot.measuring.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
 from jaxrot.solvers import half_turn
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import jaxrot
-from jaxrot.report.accuracy import Accuracy
+from jaxrot.measuring.accuracy import Accuracy
+from jaxrot.measuring.timing import Timing
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.timing import Timing
 from jaxrot.report.words import listed, number
 
 CONTROL = "svd"

@@ -10,11 +10,11 @@ import numpy as np
 
 import jaxrot
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
-from jaxrot.report.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
+from jaxrot.measuring import reference
+from jaxrot.measuring.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
+from jaxrot.measuring.judging import Judged, judge
+from jaxrot.measuring.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
 from jaxrot.report.inputs import Input
-from jaxrot.report.judging import Judged, judge
-from jaxrot.report.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
 
 WHOLE = "whole input"
 

@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from jaxrot.report.accuracy import Accuracy
+from jaxrot.measuring.accuracy import Accuracy
+from jaxrot.measuring.timing import Timing
 from jaxrot.report.bench import Bench
 from jaxrot.report.findings import findings
 from jaxrot.report.inputs import Input
@@ -23,7 +24,6 @@ from jaxrot.report.tables import (
     summary_table,
     timing_table,
 )
-from jaxrot.report.timing import Timing
 
 _CONTRACT = """\
 The **contract**, for a finite matrix with singular values s1 ≥ s2 ≥ |s3|, κ = s1/(s2+s3), R* its nearest rotation:

@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import jaxrot
-from jaxrot.report.accuracy import Accuracy
+from jaxrot.measuring.accuracy import Accuracy
+from jaxrot.measuring.domain import describe_domain
+from jaxrot.measuring.timing import Timing
 from jaxrot.report.bench import Goal, Stage
-from jaxrot.report.domain import describe_domain
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.timing import Timing
 from jaxrot.report.words import number
 
 

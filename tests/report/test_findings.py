@@ -1,10 +1,10 @@
 import pytest
 
 import jaxrot
-from jaxrot.report.accuracy import Accuracy
+from jaxrot.measuring.accuracy import Accuracy
+from jaxrot.measuring.timing import Timing
 from jaxrot.report.findings import findings, largest_batch
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.timing import Timing
 
 DEFAULT = jaxrot.DEFAULT_METHOD
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.solvers.gram_schmidt import orthogonalised, solve
 
 ORDERS = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]

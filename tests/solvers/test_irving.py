@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.solvers import irving
 
 solve = jax.jit(irving.solve)

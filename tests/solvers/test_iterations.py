@@ -7,7 +7,7 @@ import pytest
 
 from jaxrot import _mat3, _quaternion
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.solvers import higham_newton, higham_noferini, taylor
 
 

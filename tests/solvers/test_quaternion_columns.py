@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxrot import METHODS
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 
 
 def test_the_average_is_best_in_the_worst_case_and_shepperd_and_markley_worst_in_the_mean():

@@ -8,7 +8,7 @@ import pytest
 from jaxrot import _mat3
 from jaxrot._scaling import safe_divide, scaled
 from jaxrot.families import FAMILIES
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.solvers import implicit_qr_svd, jacobi_svd
 
 MODULES = pytest.mark.parametrize("module", [jacobi_svd, implicit_qr_svd], ids=["jacobi_svd", "implicit_qr_svd"])

@@ -10,7 +10,7 @@ import pytest
 from jaxrot import _mat3, _quaternion, refine_quaternion_wxyz, refine_rotation
 from jaxrot._scaling import scaled
 from jaxrot.families import FAMILIES, half_turn_starts
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.steps.escape import leave_equilibrium
 
 escaped = jax.jit(functools.partial(refine_rotation, iterations=0, escape=True))

@@ -11,7 +11,7 @@ from certificate import assert_rotations
 
 from jaxrot import STEPS, _mat3, _quaternion, refine_rotation
 from jaxrot.families import FAMILIES, half_turn_starts
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 from jaxrot.steps.exact_angle import turn_about
 
 EXACT_ANGLE = ["torque_exact_angle", "newton"]

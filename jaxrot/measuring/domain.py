@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from jaxrot import Method
-from jaxrot.report.judging import Judged
+from jaxrot.measuring.judging import Judged
+from jaxrot.solvers import Method
 
 # Bounds in units of eps; the forward error's is per (1 + κ), the last two are relative to s1.
 FORWARD_BOUND = 8

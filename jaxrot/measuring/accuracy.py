@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxrot import Method
-from jaxrot.report import domain, reference
-from jaxrot.report.judging import Judged
+from jaxrot.measuring import domain, reference
+from jaxrot.measuring.judging import Judged
+from jaxrot.solvers import Method
 
 
 class Accuracy(NamedTuple):

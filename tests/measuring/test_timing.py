@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jaxrot.report import timing
+from jaxrot.measuring import timing
 
 
 class Clock:

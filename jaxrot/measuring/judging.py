@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxrot.report import reference
+from jaxrot.measuring import reference
 
 
 class Judged(NamedTuple):

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from jaxrot.families import FAMILIES, poison
-from jaxrot.report import reference
-from jaxrot.report.reference import EPS
+from jaxrot.measuring import reference
+from jaxrot.measuring.reference import EPS
 
 MEASURES = (reference.forward_error, reference.lost_trace, reference.torque, reference.certificate_gap)
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot.report import accuracy
-from jaxrot.report.domain import describe_domain, in_domain
-from jaxrot.report.judging import judge
+from jaxrot.measuring import accuracy
+from jaxrot.measuring.domain import describe_domain, in_domain
+from jaxrot.measuring.judging import judge
 
 EPS = np.finfo(np.float32).eps
 
