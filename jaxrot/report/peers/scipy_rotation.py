@@ -1,0 +1,63 @@
+"""SciPy's `Rotation`, which computes in float64 on one thread and has no derivative."""
+
+import warnings
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxrot.report.peers.peer import Peer
+
+
+class _Accepted(NamedTuple):
+    """The matrices that SciPy takes, in float64, and where they stood."""
+
+    matrices: np.ndarray
+    places: np.ndarray
+
+
+def from_matrix(dtype: str) -> Peer:
+    """`Rotation.from_matrix`, which orthogonalises, and raises for a whole batch where one determinant is ≤ 0."""
+    from scipy.spatial.transform import Rotation
+
+    return _peer(dtype, lambda matrices: Rotation.from_matrix(matrices).as_matrix())
+
+
+def align_vectors(dtype: str) -> Peer:
+    """`Rotation.align_vectors` of the columns of A with the axes: Kabsch's method, one matrix a call."""
+    from scipy.spatial.transform import Rotation
+
+    axes = np.eye(3)
+
+    def rotations(matrices: np.ndarray) -> np.ndarray:
+        return np.stack([Rotation.align_vectors(matrix.T, axes)[0].as_matrix() for matrix in matrices])
+
+    return _peer(dtype, rotations)
+
+
+def _peer(dtype: str, rotations: Callable[[np.ndarray], np.ndarray]) -> Peer:
+    def is_accepted(matrix: np.ndarray) -> bool:
+        try:
+            rotations(matrix[None])
+        except (ValueError, np.linalg.LinAlgError):
+            return False
+        return True
+
+    def load(matrices: np.ndarray) -> _Accepted:
+        wide = matrices.astype(np.float64)
+        with warnings.catch_warnings(action="ignore"):
+            places = np.array([is_accepted(matrix) for matrix in wide])
+        return _Accepted(wide[places], places)
+
+    def value(accepted: _Accepted) -> tuple[np.ndarray, np.ndarray]:
+        # SciPy warns where the rotation is not unique; the report judges that itself.
+        with warnings.catch_warnings(action="ignore"):
+            return rotations(accepted.matrices), accepted.places
+
+    def unload(result: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        found, places = result
+        whole = np.full((len(places), 3, 3), np.nan)
+        whole[places] = found
+        return whole.astype(dtype)
+
+    return Peer(load, value, None, unload, threads=1, computes_in="float64")
