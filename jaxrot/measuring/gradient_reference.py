@@ -9,7 +9,8 @@ from jaxrot.measuring.reference import Reference, solve
 def pullback(matrices: ArrayLike, rotation_bar: ArrayLike, *, reference: Reference | None = None) -> NDArray:
     """The cotangent of A for a cotangent of R: the derivative of ⟨R̄, R(A)⟩ with respect to A.
 
-    It is R [h]× with h = (tr(S)·1 − S)⁻¹ vee(RᵀR̄ − R̄ᵀR), S = RᵀA, whose eigenvalues are the sums of two singular values.
+    It is R [h]× with h = (tr(S)·1 − S)⁻¹ vee(RᵀR̄ − R̄ᵀR), S = RᵀA; the eigenvalues of the
+    inverted matrix are the sums of two singular values.
 
     Args:
         matrices: A, shape (n, 3, 3).

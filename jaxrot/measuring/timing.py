@@ -2,8 +2,8 @@
 
 import random
 import time
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Hashable, Mapping
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +13,9 @@ import numpy as np
 SHORTEST_SAMPLE_S = 2e-3
 FEWEST_ROUNDS = 3
 MOST_ROUNDS = 31
+
+
+Name = TypeVar("Name", bound=Hashable)
 
 
 class Compiled(NamedTuple):
@@ -73,14 +76,14 @@ def fill_batch(matrices: np.ndarray, batch: int) -> np.ndarray:
 
 
 def interleave(
-    calls: Mapping[str, Callable[[], object]],
+    calls: Mapping[Name, Callable[[], object]],
     *,
     budget_s: float,
     clock: Callable[[], float] = time.perf_counter,
     shortest_sample_s: float = SHORTEST_SAMPLE_S,
     fewest_rounds: int = FEWEST_ROUNDS,
     most_rounds: int = MOST_ROUNDS,
-) -> tuple[dict[str, list[float]], dict[str, int]]:
+) -> tuple[dict[Name, list[float]], dict[Name, int]]:
     """Times several functions in rounds, each once a round and in random order.
 
     Whatever drifts (clock rate, temperature, somebody else's work) hits all of them alike, and none always runs behind
@@ -105,7 +108,7 @@ def interleave(
         repeats[name] = max(1, min(1000, round(shortest_sample_s / max(clock() - begin, 1e-9))))
     shuffle = random.Random(0).shuffle
     order = list(calls)
-    samples: dict[str, list[float]] = {name: [] for name in calls}
+    samples: dict[Name, list[float]] = {name: [] for name in calls}
     start = clock()
     for rounds in range(most_rounds):
         if rounds >= fewest_rounds and clock() - start > budget_s:

@@ -10,7 +10,7 @@ PEERS: Mapping[str, Source] = MappingProxyType(
     {
         "jnp.linalg.svd": Source("with the sign of the last singular vector mended", ("jax",), jax_linalg.svd),
         "jax polar": Source("jax.scipy.linalg.polar, which knows no reflection", ("jax",), jax_linalg.polar),
-        "jnp.linalg.eigh": Source("of Davenport's symmetric 4×4 matrix", ("jax",), jax_linalg.eigh),
+        "jnp.linalg.eigh": Source("of Davenport's matrix, 4 by 4", ("jax",), jax_linalg.eigh),
         "SciPy from_matrix": Source(
             "scipy Rotation.from_matrix, for det A > 0 only", ("scipy",), scipy_rotation.from_matrix, 10_000
         ),

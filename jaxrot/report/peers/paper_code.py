@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from jaxrot.console.environment import usable_cores
-from jaxrot.report.peers.peer import Peer, Unavailable
+from jaxrot.report.peers.peer import Peer, UnavailableError
 
 _SOURCE = Path(__file__).with_name("paper_code.cpp")
 _FOLDERS = ("/usr/include/eigen3", "/usr/local/include/eigen3", "/opt/homebrew/include/eigen3")
@@ -46,7 +46,7 @@ def refine(dtype: str) -> tuple[Callable[[np.ndarray, np.ndarray, int], np.ndarr
     """Appendix D from a warm start: (matrices, rotations, iterations) to rotations, and its threads.
 
     Raises:
-        Unavailable: No compiler, no Eigen, or it does not compile.
+        UnavailableError: No compiler, no Eigen, or it does not compile.
     """
     library, threads = _library()
     function = library[f"torque_{dtype}"]
@@ -80,10 +80,10 @@ def _library() -> tuple[ctypes.CDLL, int]:
     """The compiled code and its threads."""
     compiler = next(filter(None, map(shutil.which, (os.environ.get("CXX") or "c++", "g++", "clang++"))), None)
     if compiler is None:
-        raise Unavailable("no C++ compiler")
+        raise UnavailableError("no C++ compiler")
     folder = next((place for place in _FOLDERS if (Path(place) / "Eigen").is_dir()), None)
     if folder is None:
-        raise Unavailable("no Eigen headers")
+        raise UnavailableError("no Eigen headers")
     with tempfile.TemporaryDirectory() as place:
         target = Path(place) / "paper_code.so"
         command = [compiler, "-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC", f"-I{folder}"]
@@ -95,7 +95,7 @@ def _library() -> tuple[ctypes.CDLL, int]:
                 library = ctypes.CDLL(str(target))
                 _declare(library)
                 return library, threads
-    raise Unavailable(f"the C++ does not compile: {(done.stderr.strip().splitlines() or ['no message'])[0]}")
+    raise UnavailableError(f"the C++ does not compile: {(done.stderr.strip().splitlines() or ['no message'])[0]}")
 
 
 def _declare(library: ctypes.CDLL) -> None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 
-class Unavailable(Exception):
+class UnavailableError(Exception):
     """Why a peer cannot run here, in a few words."""
 
 
@@ -38,7 +38,7 @@ class Source(NamedTuple):
     Attributes:
         description: What it is, for the report.
         needs: Modules it imports.
-        make: From "float32" or "float64" to the peer; raises `Unavailable`.
+        make: From "float32" or "float64" to the peer; raises `UnavailableError`.
         largest_batch: Matrices it can be asked for at once without the report taking all day.
     """
 
@@ -52,9 +52,9 @@ def make_peer(source: Source, dtype: str) -> Peer:
     """The peer, or why there is none.
 
     Raises:
-        Unavailable: A package is not installed, or the peer cannot run on this machine.
+        UnavailableError: A package is not installed, or the peer cannot run on this machine.
     """
     missing = [name for name in source.needs if importlib.util.find_spec(name) is None]
     if missing:
-        raise Unavailable(f"{' and '.join(missing)} not installed")
+        raise UnavailableError(f"{' and '.join(missing)} not installed")
     return source.make(dtype)

@@ -1,5 +1,6 @@
 """RoMa, on PyTorch's CPU."""
 
+import importlib
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ def horn(dtype: str) -> Peer:
 
 
 def _peer(method: str, computes_in: str) -> Peer:
-    import roma
-    import torch
+    roma: Any = importlib.import_module("roma")
+    torch: Any = importlib.import_module("torch")
 
     def value(matrix: Any) -> Any:
         with torch.no_grad():

@@ -1,10 +1,14 @@
 """NVIDIA Warp's `svd3`: on its CPU device, one thread, and on a GPU where there is one."""
 
+# pyright: reportInvalidTypeForm=false
+# Warp's kernels state their types as calls, which are no type expressions.
+
+import importlib
 from typing import Any
 
 import numpy as np
 
-from jaxrot.report.peers.peer import Peer, Unavailable
+from jaxrot.report.peers.peer import Peer, UnavailableError
 
 
 def on_cpu(dtype: str) -> Peer:
@@ -18,13 +22,12 @@ def on_cuda(dtype: str) -> Peer:
 
 
 def _peer(device: str, dtype: str) -> Peer:
-    import warp as wp
-
+    wp: Any = importlib.import_module("warp")
     # Or it greets on stdout, at its first use and at every compilation.
     wp.config.quiet, wp.config.log_level = True, wp.LOG_ERROR
     wp.init()
     if device != "cpu" and wp.get_cuda_device_count() == 0:
-        raise Unavailable("no CUDA device")
+        raise UnavailableError("no CUDA device")
     matrix_type, vector_type = (wp.mat33f, wp.vec3f) if dtype == "float32" else (wp.mat33d, wp.vec3d)
 
     @wp.kernel(module="unique")
