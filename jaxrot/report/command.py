@@ -1,7 +1,6 @@
 """`python -m jaxrot report`: options, their checks, and the order of things."""
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,11 +10,14 @@ from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.progress import progress
-from jaxrot.report import bench, render
-from jaxrot.report.findings import on_input, times_at_largest_batch
-from jaxrot.report.inputs import Input, dragon_input, read_input, thinned
-from jaxrot.report.measurement import Plan, Results, measure, measuring_configuration, number_of_steps
-from jaxrot.report.pareto import Panel, Point, draw_pareto
+from jaxrot.report import bench, bench_document, document, records
+from jaxrot.report.comparison import compare, read_report
+from jaxrot.report.content import Content
+from jaxrot.report.inputs import dragon_input, read_input, thinned
+from jaxrot.report.measurement import Plan, measuring_configuration
+from jaxrot.report.page import as_page
+from jaxrot.report.pictures import draw_pictures
+from jaxrot.report.sections import measure, number_of_steps
 
 _DTYPES = {"float32": ("float32",), "float64": ("float64",), "both": ("float32", "float64")}
 _LARGEST_BATCH = 10**7
@@ -31,11 +33,13 @@ class _Size(NamedTuple):
     most_matrices: int
     matrices_a_family: int
     timing_budget_s: float
+    peers_budget_s: float
+    warm_starts_budget_s: float
 
 
-_FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 70.0)
+_FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 70.0, 40.0, 16.0)
 _QUICK_BENCH = bench.Size(100, 10_000, 100_000, (10_000, 100_000), 20, 1.0)
-_QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0)
+_QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0, 4.0, 2.0)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--methods", metavar="A,B,...", help=f"which of {', '.join(jaxrot.METHODS)} (all)")
     parser.add_argument("--dtype", metavar="DTYPE", help=f"{', '.join(_DTYPES)} ({_FULL.dtype}; quick: {_QUICK.dtype})")
     parser.add_argument("--batch", metavar="N,N,...", help="batch sizes to time")
+    parser.add_argument(
+        "--peers", action="store_true", help="beside other packages, as far as they are installed (extra: peers)"
+    )
+    parser.add_argument("--compare", type=Path, metavar="OLD.json", help="the report.json of an earlier run")
     parser.add_argument(
         "--bench", action="store_true", help="instead: the library's own speed goals, and what each stage costs"
     )
@@ -67,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
     size = _QUICK if options.quick else _FULL
     dtypes = _parse_dtype(options.dtype or size.dtype)
     batches = _parse_batches(options.batch) if options.batch is not None else size.batches
+    is_everything = not options.quick and options.methods is None
     plan = Plan(
         methods=_parse_methods(options.methods) if options.methods is not None else tuple(jaxrot.METHODS),
         dtypes=dtypes,
@@ -74,44 +83,53 @@ def run(options: argparse.Namespace) -> int:
         batch_if_time_permits=size.batch_if_time_permits if options.batch is None else None,
         matrices_a_family=size.matrices_a_family,
         timing_budget_s=size.timing_budget_s,
+        peers_budget_s=size.peers_budget_s if options.peers else None,
+        warm_starts_budget_s=size.warm_starts_budget_s if is_everything else None,
     )
-    check_installed(["matplotlib"], "report")
+    before = options.compare and read_report(options.compare)
+    check_installed(["markdown", "matplotlib"], "report")
     check_writable(options.out)
     given = (
         dragon_input(size.clusters) if options.input is None else thinned(read_input(options.input), size.most_matrices)
     )
     environment = describe_environment(dtypes)
     with measuring_configuration(), progress(number_of_steps(plan)) as advance:
-        results = measure(plan, given, advance)
+        measured = measure(plan, given, advance)
     used = {name: str(value) for name, value in vars(options).items() if isinstance(value, str | int | Path)}
-    markdown = render.as_report_markdown(results, given, environment, dtypes, "pareto.png")
+    content = Content(given, environment, used, dtypes, measured.results, measured.beside, measured.warm_starts)
+    if before:
+        sets = {name: len(part) for name, part in given.sets.items()}
+        content = content._replace(comparison=compare(options.compare.name, before, measured.results, sets))
+    pictures = draw_pictures(content)
+    markdown = document.as_report_markdown(content, pictures)
     files = {
         "report.md": markdown.encode(),
-        "report.csv": render.as_csv(results).encode(),
-        "report.json": render.as_json(results, given, environment, dtypes, used).encode(),
-        "pareto.png": _picture(results, given, environment, dtypes),
+        "report.html": as_page(markdown, pictures).encode(),
+        "report.csv": records.as_csv(content.results).encode(),
+        "report.json": records.as_json(content).encode(),
+        **pictures,
     }
     write_files(options.out, files)
-    print(render.as_terminal_text(results, given, environment, dtypes))
+    print(document.as_terminal_text(content))
     print(f"\nWritten to {options.out}: {', '.join(files)}")
     return 0
 
 
 def _run_bench(options: argparse.Namespace) -> int:
-    fixed = ("input", "methods", "dtype", "batch")
+    fixed = ("input", "methods", "dtype", "batch", "peers", "compare")
     for name in fixed:
-        if getattr(options, name) is not None:
+        if getattr(options, name):
             raise UserError(f"--bench measures a fixed list; it goes without {', '.join(f'--{x}' for x in fixed)}")
     check_writable(options.out)
     environment = describe_environment(("float32", "float64"))
     with measuring_configuration(), progress(len(bench.GROUPS)) as advance:
         measured = bench.run_bench(_QUICK_BENCH if options.quick else bench.Size(), advance)
     files = {
-        "bench.md": render.as_bench_markdown(measured, environment).encode(),
-        "bench.json": render.as_bench_json(measured, environment).encode(),
+        "bench.md": bench_document.as_bench_markdown(measured, environment).encode(),
+        "bench.json": records.as_bench_json(measured, environment).encode(),
     }
     write_files(options.out, files)
-    print(render.as_bench_text(measured, environment))
+    print(bench_document.as_bench_text(measured, environment))
     print(f"\nWritten to {options.out}: {', '.join(files)}")
     return 0
 
@@ -140,29 +158,3 @@ def _parse_batches(words: str) -> tuple[int, ...]:
     if not 1 <= batches[0] <= batches[-1] <= _LARGEST_BATCH:
         raise UserError(f"--batch {words}: {expected}")
     return tuple(batches)
-
-
-def _picture(results: Results, given: Input, environment: Mapping[str, str], dtypes: tuple[str, ...]) -> bytes:
-    panels = []
-    for dtype in dtypes:
-        times, accuracy = times_at_largest_batch(results, dtype), on_input(results, dtype)
-        points = [
-            Point(
-                name=name,
-                time_ns=time.median_ns,
-                error=entry.forward_99th,
-                error_median=entry.forward_median,
-                error_max=entry.forward_max,
-                is_exact=jaxrot.METHODS[name].exact,
-            )
-            for name, time in times.items()
-            if (entry := accuracy[name]).forward_99th is not None
-            and entry.forward_median is not None
-            and entry.forward_max is not None
-        ]
-        panels.append(Panel(dtype, next(iter(times.values())).batch, points))
-    count = sum(map(len, given.sets.values()))
-    return draw_pareto(
-        panels,
-        f"Error against run time: {given.name}, {count:,} matrices\n{environment['device']}, {environment['threads']}",
-    )

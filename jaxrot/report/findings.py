@@ -1,11 +1,14 @@
-"""What the numbers say, in sentences computed from them."""
+"""What the numbers say: the three sentences that open the report, computed from them."""
 
 from collections.abc import Sequence
 
 import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
+from jaxrot.report.contenders import Beside, Contender, Spread, beyond_front
+from jaxrot.report.content import Content
 from jaxrot.report.measurement import WHOLE, Results
+from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, WarmStart
 from jaxrot.report.words import listed, number
 
 CONTROL = "svd"
@@ -35,44 +38,40 @@ def on_input(results: Results, dtype: str) -> dict[str, Accuracy]:
     }
 
 
-def findings(results: Results, dtypes: Sequence[str], input_name: str) -> list[str]:
-    """The paragraphs that open the report, the most useful first."""
-    paragraphs = [_fastest(results, dtype, input_name) for dtype in dtypes]
-    paragraphs.append(_broken_promises(results))
-    counted = on_input(results, dtypes[0])
-    first = next(iter(counted.values()))
-    if first.not_finite:
-        paragraphs.append(
-            f"{first.not_finite:,} of the {first.matrices:,} matrices of {input_name} hold a NaN or an infinity in"
-            f" {dtypes[0]}; they are timed but left out of every error."
-        )
-    return paragraphs
+def findings(content: Content) -> list[str]:
+    """The sentences that open the report: which method, against whom, and where promises break."""
+    second = _peers(content.beside) if content.beside is not None else _warm_starts(content.warm_starts)
+    sentences = [_fastest(content.results, content.dtypes, content.given.name), second]
+    return [sentence for sentence in [*sentences, _promises(content.results)] if sentence]
 
 
-def _fastest(results: Results, dtype: str, input_name: str) -> str:
-    times = times_at_largest_batch(results, dtype)
-    accuracy = on_input(results, dtype)
-    count = next(iter(accuracy.values())).matrices
+def faster_outside(results: Results, dtype: str) -> str:
+    """Which methods are faster than the fastest one within the contract, and on how much of the input outside it."""
+    times, accuracy = times_at_largest_batch(results, dtype), on_input(results, dtype)
     keeping = [name for name in times if accuracy[name].outside == 0]
-    if not keeping:
-        best = min(accuracy.values(), key=lambda entry: entry.outside)
-        return (
-            f"In {dtype} no method measured keeps the contract on all {count:,} matrices of {input_name};"
-            f" {best.method} comes closest, outside it on {best.outside:,}."
-        )
-    chosen = times[keeping[0]]
-    text = (
-        f"In {dtype} the fastest method that keeps the contract on all {count:,} matrices of {input_name} is"
-        f" **{chosen.method}**: {number(chosen.median_ns)} ns a matrix at batch {chosen.batch:,}"
-        f"{_against_control(times, chosen)}."
-    )
-    faster = [name for name in times if times[name].quartile_3_ns < chosen.quartile_1_ns]
-    if faster:
-        beaten_by = ", ".join(
-            f"{name} ({number(times[name].median_ns)} ns, outside on {accuracy[name].outside:,})" for name in faster
-        )
-        text += f" Faster, but not within the contract here: {beaten_by}."
-    return text
+    faster = [name for name in times if keeping and times[name].quartile_3_ns < times[keeping[0]].quartile_1_ns]
+    words = [f"{name} ({number(times[name].median_ns)} ns, outside on {accuracy[name].outside:,})" for name in faster]
+    return f"Faster in {dtype}, but not within the contract here: {', '.join(words)}." if words else ""
+
+
+def _fastest(results: Results, dtypes: Sequence[str], input_name: str) -> str:
+    kept, closest = [], []
+    for dtype in dtypes:
+        times, accuracy = times_at_largest_batch(results, dtype), on_input(results, dtype)
+        keeping = [name for name in times if accuracy[name].outside == 0]
+        if keeping:
+            chosen = times[keeping[0]]
+            time = f"{number(chosen.median_ns)} ns a matrix at batch {chosen.batch:,}"
+            kept.append(f"**{chosen.method}** in {dtype}, {time}{_against_control(times, chosen)}")
+        else:
+            best = min(accuracy.values(), key=lambda entry: entry.outside)
+            closest.append(f"{best.method} comes closest in {dtype}, outside on {best.outside:,}")
+    count = next(iter(on_input(results, dtypes[0]).values())).matrices
+    which = f"keeps the contract on all {count:,} matrices of {input_name}"
+    if not kept:
+        return f"No method measured {which}: {'; '.join(closest)}."
+    none = "; none keeps it in the other dtype: " if closest else ""
+    return f"The fastest method that {which} is {'; '.join(kept)}{none}{'; '.join(closest)}."
 
 
 def _against_control(times: dict[str, Timing], chosen: Timing) -> str:
@@ -85,7 +84,68 @@ def _against_control(times: dict[str, Timing], chosen: Timing) -> str:
     return f", within the spread of {CONTROL}"
 
 
-def _broken_promises(results: Results) -> str:
+def _peers(beside: Beside) -> str:
+    clauses = []
+    for what, of_gradients in (("values", False), ("gradients", True)):
+        beyond = beyond_front(beside.contenders, of_gradients=of_gradients)
+        if beyond:
+            names = listed([f"{contender.name} in {contender.dtype}" for contender in beyond])
+            clauses.append(f"for {what} **{names} {'lies' if len(beyond) == 1 else 'lie'} beyond jaxrot's front**")
+        elif any(_time(contender, of_gradients) for contender in beside.contenders if not contender.is_own):
+            clauses.append(f"for {what} no peer lies below and left of jaxrot's front{_nearest(beside, of_gradients)}")
+    return f"Peers: {'; '.join(clauses)}." if clauses else "No peer could be measured here."
+
+
+def _nearest(beside: Beside, of_gradients: bool) -> str:
+    """The fastest peer against the default method, in each dtype."""
+    words = []
+    for dtype in dict.fromkeys(contender.dtype for contender in beside.contenders):
+        of_dtype = [contender for contender in beside.contenders if contender.dtype == dtype]
+        times = {c.name: t for c in of_dtype if (t := _time(c, of_gradients)) is not None}
+        default = times.get(jaxrot.DEFAULT_METHOD)
+        peers = [contender for contender in of_dtype if not contender.is_own and contender.name in times]
+        if default is None or not peers:
+            continue
+        fastest = min(peers, key=lambda contender: times[contender.name].median)
+        time = times[fastest.name]
+        ratio = time.median / default.median
+        is_apart = default.quartile_3 < time.quartile_1 or time.quartile_3 < default.quartile_1
+        words.append(
+            f"{fastest.name} takes {ratio:.2g} times as long as {jaxrot.DEFAULT_METHOD} in {dtype}"
+            if is_apart
+            else f"{fastest.name} is within the spread of {jaxrot.DEFAULT_METHOD} in {dtype}"
+        )
+    return f" (the fastest, {'; '.join(words)})" if words else ""
+
+
+def _time(contender: Contender, of_gradients: bool) -> Spread | None:
+    return contender.gradient_time if of_gradients else contender.time
+
+
+def _warm_starts(entries: Sequence[WarmStart]) -> str:
+    """The cheapest number of iterations that is as right as the cold start, in each dtype."""
+    clauses = []
+    for dtype in dict.fromkeys(entry.dtype for entry in entries):
+        of_dtype = [entry for entry in entries if entry.dtype == dtype and entry.step != PAPER]
+        cold = next((entry for entry in of_dtype if entry.step == COLD_START), None)
+        if cold is None:
+            continue
+        as_right = [e for e in of_dtype if e != cold and e.error.percentile_99 <= 2 * cold.error.percentile_99]
+        if not as_right:
+            clauses.append(f"no step measured is as accurate as the cold start in {dtype}")
+            continue
+        best = min(as_right, key=lambda entry: entry.time.median)
+        if best.time.quartile_3 < cold.time.quartile_1:
+            share = f"takes {best.time.median / cold.time.median:.2g} times the time of the cold start"
+        else:
+            share = "is not faster than the cold start, by the spread"
+        clauses.append(f"{best.iterations} {best.step} in {dtype} {share}")
+    if not clauses:
+        return ""
+    return f"From a start {ANGLE_DEGREES:.0f}° off, to twice the cold start's error: {'; '.join(clauses)}."
+
+
+def _promises(results: Results) -> str:
     broken: dict[str, int] = {}
     for entry in results.accuracy:
         # The input's parts are in the whole.
@@ -101,8 +161,7 @@ def _broken_promises(results: Results) -> str:
         text += f"{'; ' if kept else ''}broken inside the declared domain: {', '.join(failed)}"
     without = [name for name in broken if name not in promising]
     if without:
+        names = listed(without) if len(without) < 4 else f"the {len(without)} others"
         verb = "declares" if len(without) == 1 else "declare"
-        text += (
-            f"{'; ' if kept or failed else ''}{listed(without)} {verb} no domain in which the whole contract is kept"
-        )
+        text += f"{'; ' if kept or failed else ''}{names} {verb} no domain in which the whole contract is kept"
     return text + "."

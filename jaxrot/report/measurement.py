@@ -1,4 +1,4 @@
-"""The main job: every method, judged and timed on one input."""
+"""Every method, judged and timed on one input in one dtype."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -9,12 +9,10 @@ import jax
 import numpy as np
 
 import jaxrot
-from jaxrot.families import FAMILIES
 from jaxrot.measuring import reference
 from jaxrot.measuring.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
-from jaxrot.measuring.judging import Judged, judge
+from jaxrot.measuring.judging import Judged
 from jaxrot.measuring.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
-from jaxrot.report.inputs import Input
 
 WHOLE = "whole input"
 
@@ -28,7 +26,9 @@ class Plan(NamedTuple):
         batches: Batch sizes to time, ascending.
         batch_if_time_permits: One more, timed where `timing_budget_s` is not spent by then.
         matrices_a_family: Matrices drawn from each family.
-        timing_budget_s: Seconds for all timing together, roughly.
+        timing_budget_s: Seconds for all timing of methods together, roughly.
+        peers_budget_s: Seconds for the rounds with peers in both dtypes; None leaves peers out.
+        warm_starts_budget_s: Seconds for the rounds of warm starts in both dtypes; None leaves them out.
     """
 
     methods: tuple[str, ...]
@@ -37,6 +37,8 @@ class Plan(NamedTuple):
     batch_if_time_permits: int | None
     matrices_a_family: int
     timing_budget_s: float
+    peers_budget_s: float | None = None
+    warm_starts_budget_s: float | None = None
 
 
 class Results(NamedTuple):
@@ -68,38 +70,19 @@ def measuring_configuration() -> Iterator[None]:
 
 
 def number_of_steps(plan: Plan) -> int:
-    """How often `measure` calls `advance`."""
+    """How often `measure_methods` calls `advance`."""
     batches = len(plan.batches) + (plan.batch_if_time_permits is not None)
-    return len(plan.dtypes) * (1 + batches * (len(plan.methods) + 1) + len(plan.methods))
+    return batches * (len(plan.methods) + 1) + len(plan.methods)
 
 
-def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Results:
+def measure_methods(plan: Plan, judged: Mapping[str, Judged], advance: Callable[[str], object]) -> Results:
     """Judges and times every method of the plan, inside `measuring_configuration`.
 
     Args:
         plan: What to measure.
-        given: On which matrices; the families come on top.
+        judged: "input" and "families", in one dtype.
         advance: Called before each step with what it is.
     """
-    results = Results([], [], ())
-    for dtype in plan.dtypes:
-        advance(f"{dtype}: the reference")
-        judged = {
-            "input": judge(given.sets, dtype, whole=WHOLE),
-            "families": judge(_families(plan.matrices_a_family, dtype), dtype),
-        }
-        found = _measure_dtype(plan, judged, advance)
-        results = Results(
-            results.accuracy + found.accuracy, results.timing + found.timing, results.remarks + found.remarks
-        )
-    return results
-
-
-def _families(count: int, dtype: str) -> dict[str, np.ndarray]:
-    return {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}
-
-
-def _measure_dtype(plan: Plan, judged: Mapping[str, Judged], advance: Callable[[str], object]) -> Results:
     matrices = judged["input"].matrices
     dtype = matrices.dtype.name
     budget = plan.timing_budget_s / len(plan.dtypes)

@@ -1,4 +1,4 @@
-"""The picture of the report: error against time, and which methods nothing else beats in both."""
+"""Error against time as a picture, and which methods nothing else beats in both."""
 
 import io
 import itertools
@@ -10,15 +10,20 @@ import numpy as np
 from jaxrot.report.labels import place_labels
 
 # Okabe and Ito's colours, told apart without seeing red or green; shape and filling tell the kinds apart in grey too.
-_EXACT = {"color": "#0072B2", "marker": "o"}
-_APPROXIMATION = {"color": "#D55E00", "marker": "^"}
+EXACT, APPROXIMATION, PEER = "exact method", "approximation", "another package"
+_STYLES = {
+    EXACT: {"color": "#0072B2", "marker": "o"},
+    APPROXIMATION: {"color": "#D55E00", "marker": "^"},
+    PEER: {"color": "#8A4B73", "marker": "s"},
+}
 _FRONT_COLOR = "#009E73"
-# ‖R - R*‖_F is at most 2√2 between rotations; what is no number is drawn there.
+# ‖R - R*‖_F is at most 2√2 between rotations; what is larger or no number is drawn there.
 _LARGEST_ERROR = 8**0.5
+_VALUE_ERROR = "forward error ‖R - R*‖$_F$, 99th percentile"
 
 
 class Point(NamedTuple):
-    """One method in the picture.
+    """One method or peer in the picture.
 
     Attributes:
         name: Its label.
@@ -26,7 +31,7 @@ class Point(NamedTuple):
         error: The error that places it: the 99th percentile.
         error_median: Lower end of its whisker.
         error_max: Upper end.
-        is_exact: The method computes the nearest rotation and not something near it.
+        kind: `EXACT`, `APPROXIMATION` or `PEER`.
     """
 
     name: str
@@ -34,7 +39,7 @@ class Point(NamedTuple):
     error: float
     error_median: float
     error_max: float
-    is_exact: bool
+    kind: str
 
 
 class Panel(NamedTuple):
@@ -61,8 +66,8 @@ def pareto_front(points: Sequence[Point]) -> list[Point]:
     return front
 
 
-def draw_pareto(panels: Sequence[Panel], title: str) -> bytes:
-    """The picture as PNG, one panel a dtype."""
+def draw_pareto(panels: Sequence[Panel], title: str, error_name: str = _VALUE_ERROR) -> bytes:
+    """The picture as PNG, one panel a dtype. The front is jaxrot's own; a filled peer is beyond it."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -73,6 +78,7 @@ def draw_pareto(panels: Sequence[Panel], title: str) -> bytes:
     figure.suptitle(title, fontsize=11)
     for axes, panel in zip(all_axes, panels, strict=True):
         _draw_panel(axes, panel)
+        axes.set_ylabel(error_name)
     _draw_legend(figure, panels)
     figure.canvas.draw()
     # From here the layout must hold still: a label is placed where its neighbours are drawn.
@@ -95,9 +101,13 @@ def draw_pareto(panels: Sequence[Panel], title: str) -> bytes:
     return buffer.getvalue()
 
 
+def _own_front(panel: Panel) -> list[Point]:
+    return pareto_front([point for point in panel.points if point.kind != PEER])
+
+
 def _front_line(panel: Panel, floor: float) -> list[tuple[float, float]]:
     """Places along the drawn front, close enough together that no word fits between."""
-    front = [(point.time_ns, _clip(point.error, floor)) for point in pareto_front(panel.points)]
+    front = [(point.time_ns, _clip(point.error, floor)) for point in _own_front(panel)]
     line = []
     for (x, y), (next_x, next_y) in itertools.pairwise(front):
         line += [(place, y) for place in np.geomspace(x, next_x, 60).tolist()]
@@ -107,7 +117,7 @@ def _front_line(panel: Panel, floor: float) -> list[tuple[float, float]]:
 
 def _draw_panel(axes: Any, panel: Panel) -> None:
     eps, floor = np.finfo(panel.dtype).eps, _floor(panel.dtype)
-    front = pareto_front(panel.points)
+    front, unbeaten = _own_front(panel), pareto_front(panel.points)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.axhline(eps, color="0.6", linewidth=0.8, linestyle=":")
@@ -120,12 +130,12 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         color=_FRONT_COLOR, linewidth=2, alpha=0.6, zorder=1, drawstyle="steps-post",
     )  # fmt: skip
     for point in panel.points:
-        style = _EXACT if point.is_exact else _APPROXIMATION
+        style = _STYLES[point.kind]
         ends = [_clip(point.error_median, floor), _clip(point.error_max, floor)]
         axes.plot([point.time_ns] * 2, ends, color=style["color"], linewidth=1, alpha=0.5, zorder=2)
         axes.plot(
             point.time_ns, _clip(point.error, floor), linestyle="none", markersize=8, zorder=3,
-            markerfacecolor=style["color"] if point in front else "white", markeredgecolor=style["color"],
+            markerfacecolor=style["color"] if point in unbeaten else "white", markeredgecolor=style["color"],
             marker=style["marker"],
         )  # fmt: skip
     # Room for labels beside the outermost points.
@@ -137,7 +147,6 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
     axes.set_axisbelow(True)
     axes.set_title(f"{panel.dtype}, batch {panel.batch:,}", fontsize=10)
     axes.set_xlabel("time a matrix [ns], median")
-    axes.set_ylabel("forward error ‖R - R*‖$_F$, 99th percentile")
 
 
 def _draw_legend(figure: Any, panels: Sequence[Panel]) -> None:
@@ -145,22 +154,22 @@ def _draw_legend(figure: Any, panels: Sequence[Panel]) -> None:
 
     points = [point for panel in panels for point in panel.points]
     handles = []
-    for style, is_exact, name in ((_EXACT, True, "exact method"), (_APPROXIMATION, False, "approximation")):
-        if any(point.is_exact == is_exact for point in points):
+    for kind, style in _STYLES.items():
+        if any(point.kind == kind for point in points):
             handles.append(
-                Line2D([], [], linestyle="none", markersize=8, label=name, color=style["color"], marker=style["marker"])
+                Line2D([], [], linestyle="none", markersize=8, label=kind, color=style["color"], marker=style["marker"])
             )
     handles.append(
         Line2D([], [], linestyle="none", markersize=8, marker="o", color="0.3", markerfacecolor="white",
                label="hollow: another is faster and more accurate")
     )  # fmt: skip
-    handles.append(Line2D([], [], color=_FRONT_COLOR, linewidth=2, alpha=0.6, label="Pareto front"))
+    handles.append(Line2D([], [], color=_FRONT_COLOR, linewidth=2, alpha=0.6, label="Pareto front of jaxrot"))
     handles.append(Line2D([], [], color="0.3", linewidth=1, label="from median to largest error"))
     if any(point.error_median < _floor(panel.dtype) for panel in panels for point in panel.points):
         handles.append(Line2D([], [], linestyle="none", label="errors below eps/10 are drawn there"))
     if any(not np.isfinite(point.error_max) for panel in panels for point in panel.points):
         handles.append(Line2D([], [], linestyle="none", label="(NaN): some results are no numbers, drawn at 2√2"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(3, 1 + len(panels)), fontsize=8, frameon=False)
 
 
 def _floor(dtype: str) -> float:

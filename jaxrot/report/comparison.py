@@ -1,0 +1,189 @@
+"""This report against an earlier one: what got slower, what got worse."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxrot.console.errors import UserError
+from jaxrot.measuring.timing import Timing
+from jaxrot.report.measurement import WHOLE, Results
+
+EXPECTED = "expected the report.json of an earlier run"
+
+
+class TimeChange(NamedTuple):
+    """One method at one batch size, then and now.
+
+    Attributes:
+        method: Its name.
+        dtype: "float32" or "float64".
+        batch: Matrices in a call.
+        before_ns: Median a matrix in the earlier run.
+        now_ns: Median a matrix in this one.
+        ratio: now / before; above 1 it takes longer.
+        relative: The ratio over the median of all ratios, which is what the machine itself contributes.
+        verdict: "slower" or "faster" where the quartiles of both runs stand apart, also when the machine's share is
+            taken out; else "".
+    """
+
+    method: str
+    dtype: str
+    batch: int
+    before_ns: float
+    now_ns: float
+    ratio: float
+    relative: float
+    verdict: str
+
+
+class ErrorChange(NamedTuple):
+    """One method on the whole input, then and now.
+
+    Attributes:
+        method: Its name.
+        dtype: "float32" or "float64".
+        before: 99th percentile of the forward error in the earlier run; None where there was none.
+        now: The same in this one.
+        outside_before: Matrices outside the contract, input and families together.
+        outside_now: The same in this one.
+        verdict: "worse", "better", or "" where neither number changed by more than a twentieth.
+    """
+
+    method: str
+    dtype: str
+    before: float | None
+    now: float | None
+    outside_before: int
+    outside_now: int
+    verdict: str
+
+
+class Comparison(NamedTuple):
+    """Two runs.
+
+    Attributes:
+        name: Of the earlier file.
+        environment: Of the earlier run.
+        machine: Median of all ratios of times: what changed for all methods alike.
+        times: One entry a method, dtype and batch size that both runs have.
+        errors: One entry a method and dtype that both have; empty where the input is another.
+        remarks: What cannot be compared and why, one sentence each.
+    """
+
+    name: str
+    environment: dict[str, str]
+    machine: float
+    times: tuple[TimeChange, ...]
+    errors: tuple[ErrorChange, ...]
+    remarks: tuple[str, ...]
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """The content of an earlier report.json.
+
+    Raises:
+        UserError: There is no such file, or it is none.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "it is no text"
+        raise UserError(f"--compare {path}: cannot be read ({reason}); {EXPECTED}") from None
+    except json.JSONDecodeError:
+        raise UserError(f"--compare {path}: this is no JSON; {EXPECTED}") from None
+    try:
+        for entry in content["timing"]:
+            Timing(**entry)
+        known = [(entry["method"], entry["dtype"], entry["outside"]) for entry in content["accuracy"]]
+        is_report = bool(known and content["timing"] and content["environment"] and content["input"]["sets"])
+    except (KeyError, TypeError):
+        is_report = False
+    if not is_report:
+        raise UserError(f"--compare {path}: holds no report; {EXPECTED}")
+    return content
+
+
+def compare(name: str, before: dict[str, Any], results: Results, sets: dict[str, int]) -> Comparison:
+    """Sets an earlier report beside new results.
+
+    Args:
+        name: The earlier file's, for the reader.
+        before: Its content.
+        results: The new ones.
+        sets: Names and sizes of the new input's sets.
+    """
+    remarks = []
+    times = _times([Timing(**entry) for entry in before["timing"]], results.timing)
+    if not times:
+        remarks.append("No method was timed in both runs at the same batch size and dtype.")
+    errors: tuple[ErrorChange, ...] = ()
+    if before["input"]["sets"] == sets:
+        errors = _errors(before["accuracy"], results)
+    else:
+        remarks.append("The earlier run was on another input; errors are not compared.")
+    machine = float(np.median([change.ratio for change in times])) if times else 1.0
+    return Comparison(name, before["environment"], machine, times, errors, tuple(remarks))
+
+
+def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[TimeChange, ...]:
+    earlier = {(entry.method, entry.dtype, entry.batch): entry for entry in before}
+    pairs = [(earlier[key], entry) for entry in now if (key := (entry.method, entry.dtype, entry.batch)) in earlier]
+    if not pairs:
+        return ()
+    machine = float(np.median([new.median_ns / old.median_ns for old, new in pairs]))
+    return tuple(
+        TimeChange(
+            method=new.method,
+            dtype=new.dtype,
+            batch=new.batch,
+            before_ns=old.median_ns,
+            now_ns=new.median_ns,
+            ratio=new.median_ns / old.median_ns,
+            relative=new.median_ns / old.median_ns / machine,
+            verdict=_verdict(old, new, machine),
+        )
+        for old, new in pairs
+    )
+
+
+def _verdict(old: Timing, new: Timing, machine: float) -> str:
+    if all(new.quartile_1_ns / share > old.quartile_3_ns for share in (1.0, machine)):
+        return "slower"
+    if all(new.quartile_3_ns / share < old.quartile_1_ns for share in (1.0, machine)):
+        return "faster"
+    return ""
+
+
+def _errors(before: Sequence[dict[str, Any]], results: Results) -> tuple[ErrorChange, ...]:
+    def outside(entries: Sequence[dict[str, Any]], method: str, dtype: str) -> int:
+        # The input's parts are in the whole.
+        return sum(
+            entry["outside"]
+            for entry in entries
+            if (entry["method"], entry["dtype"]) == (method, dtype)
+            and (entry["group"] != "input" or entry["set_name"] == WHOLE)
+        )
+
+    now = [entry._asdict() for entry in results.accuracy]
+    earlier = {(entry["method"], entry["dtype"]): entry for entry in before if entry["set_name"] == WHOLE}
+    changes = []
+    for entry in now:
+        key = entry["method"], entry["dtype"]
+        if entry["set_name"] == WHOLE and key in earlier:
+            old, new = (None if e["forward_99th"] is None else float(e["forward_99th"]) for e in (earlier[key], entry))
+            counts = outside(before, *key), outside(now, *key)
+            changes.append(ErrorChange(*key, old, new, *counts, _error_verdict((old, counts[0]), (new, counts[1]))))
+    return tuple(changes)
+
+
+def _error_verdict(old: tuple[float | None, int], new: tuple[float | None, int]) -> str:
+    if _is_more(old, new):
+        return "worse"
+    return "better" if _is_more(new, old) else ""
+
+
+def _is_more(small: tuple[float | None, int], large: tuple[float | None, int]) -> bool:
+    return large[1] > small[1] or (None not in (small[0], large[0]) and (large[0] or 0.0) > 1.05 * (small[0] or 0.0))

@@ -1,0 +1,76 @@
+"""All parts of a report, one dtype after the other."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxrot.families import FAMILIES
+from jaxrot.measuring.judging import judge
+from jaxrot.report import beside, warm_starts
+from jaxrot.report.contenders import Beside
+from jaxrot.report.inputs import Input
+from jaxrot.report.measurement import WHOLE, Plan, Results, measure_methods
+from jaxrot.report.measurement import number_of_steps as steps_of_methods
+from jaxrot.report.pareto import pareto_front
+from jaxrot.report.pictures import methods_panel
+from jaxrot.report.warm_starts import WarmStart, measure_warm_starts
+
+
+class Measured(NamedTuple):
+    """What came of a plan; parts that it leaves out are None or empty."""
+
+    results: Results
+    beside: Beside | None
+    warm_starts: tuple[WarmStart, ...]
+
+
+def number_of_steps(plan: Plan) -> int:
+    """How often `measure` calls `advance`, at most."""
+    steps = 1 + steps_of_methods(plan)
+    if plan.peers_budget_s is not None:
+        steps += beside.number_of_steps(plan.methods)
+    if plan.warm_starts_budget_s is not None:
+        steps += warm_starts.number_of_steps(with_peers=plan.peers_budget_s is not None)
+    return len(plan.dtypes) * steps
+
+
+def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measured:
+    """Measures all parts of the plan, inside `measuring_configuration`.
+
+    Args:
+        plan: What to measure.
+        given: On which matrices; the families come on top.
+        advance: Called before each step with what it is.
+    """
+    results, contenders, skipped, starts = Results([], [], ()), [], {}, []
+    for dtype in plan.dtypes:
+        advance(f"{dtype}: the reference")
+        judged = {
+            "input": judge(given.sets, dtype, whole=WHOLE),
+            "families": judge(_families(plan.matrices_a_family, dtype), dtype),
+        }
+        found = measure_methods(plan, judged, advance)
+        results = Results(
+            results.accuracy + found.accuracy, results.timing + found.timing, results.remarks + found.remarks
+        )
+        if plan.peers_budget_s is not None:
+            front = [point.name for point in pareto_front(methods_panel(found, dtype).points)]
+            measured = beside.measure_beside(
+                front, judged, batch=plan.batches[-1], budget_s=plan.peers_budget_s / len(plan.dtypes), advance=advance
+            )
+            contenders += measured.contenders
+            skipped |= dict.fromkeys(measured.skipped)
+        if plan.warm_starts_budget_s is not None:
+            starts += measure_warm_starts(
+                judged["input"],
+                batch=plan.batches[-1],
+                budget_s=plan.warm_starts_budget_s / len(plan.dtypes),
+                with_peers=plan.peers_budget_s is not None,
+                advance=advance,
+            )
+    return Measured(results, None if plan.peers_budget_s is None else Beside(contenders, list(skipped)), tuple(starts))
+
+
+def _families(count: int, dtype: str) -> dict[str, np.ndarray]:
+    return {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}

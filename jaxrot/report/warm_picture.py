@@ -1,0 +1,66 @@
+"""Warm starts as a picture: a line for every step, its points the numbers of iterations."""
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, WarmStart
+
+# Okabe and Ito's colours; the marker tells the lines apart in grey.
+_STYLES = {
+    "torque": ("#D55E00", "^"),
+    "torque_exact_angle": ("#E69F00", "v"),
+    "newton": ("#0072B2", "o"),
+    "cayley": ("#56B4E9", "D"),
+    "quest": ("#009E73", "P"),
+    PAPER: ("#8A4B73", "s"),
+}
+
+
+def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
+    """The picture as PNG, one panel a dtype."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    dtypes = list(dict.fromkeys(entry.dtype for entry in entries))
+    # Not pyplot: it would pick a display and keep the figure for the whole process.
+    figure = Figure(figsize=(1.5 + 5.7 * len(dtypes), 5.4), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(
+        f"Warm starts, {ANGLE_DEGREES:.0f}° off: error after k iterations against time ({input_name})", fontsize=11
+    )
+    handles = {}
+    for axes, dtype in zip(figure.subplots(1, len(dtypes), squeeze=False)[0], dtypes, strict=True):
+        eps = float(np.finfo(dtype).eps)
+        of_dtype = [entry for entry in entries if entry.dtype == dtype]
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        for step, (color, marker) in _STYLES.items():
+            line = sorted((entry for entry in of_dtype if entry.step == step), key=lambda entry: entry.iterations)
+            if not line:
+                continue
+            times = [entry.time.median for entry in line]
+            errors = [max(entry.error.percentile_99, eps / 10) for entry in line]
+            (handles[step],) = axes.plot(times, errors, color=color, marker=marker, markersize=6, linewidth=1.5)
+            for entry, error in zip(line, errors, strict=True):
+                axes.annotate(
+                    str(entry.iterations), (entry.time.median, error), xytext=(5, 4), textcoords="offset points",
+                    fontsize=8, color=color,
+                )  # fmt: skip
+        for entry in (entry for entry in of_dtype if entry.step == COLD_START):
+            handles[COLD_START] = axes.axvline(entry.time.median, color="0.4", linewidth=1, linestyle="--")
+            (mark,) = axes.plot(entry.time.median, max(entry.error.percentile_99, eps / 10), "k*", markersize=11)
+            handles[COLD_START] = mark
+        axes.axhline(eps, color="0.6", linewidth=0.8, linestyle=":")
+        axes.text(0.99, eps, f"eps = {eps:.1e}", transform=axes.get_yaxis_transform(), ha="right", va="bottom",
+                  fontsize=7, color="0.4")  # fmt: skip
+        axes.grid(True, which="major", color="0.9", linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.set_title(f"{dtype}, batch {of_dtype[0].batch:,}", fontsize=10)
+        axes.set_xlabel("time a matrix, all iterations [ns], median")
+        axes.set_ylabel("forward error ‖R - R*‖$_F$, 99th percentile")
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
