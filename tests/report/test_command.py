@@ -14,7 +14,7 @@ from jaxrot.__main__ import main
 from jaxrot.report import command, measurement
 from jaxrot.report.inputs import Input, read_input, thinned
 
-FILES = {"report.md", "report.csv", "report.json", "pareto.png"}
+FILES = {"report.md", "report.html", "report.csv", "report.json", "pareto.png"}
 
 
 @pytest.fixture(scope="module")
@@ -52,15 +52,33 @@ def test_all_files_are_written_and_nothing_else(report):
     assert imread(report / "pareto.png").ndim == 3
 
 
-def test_markdown_opens_with_header_findings_and_picture(report):
+def test_markdown_opens_with_findings_then_pictures_then_tables(report):
     text = (report / "report.md").read_text(encoding="utf-8")
-    positions = [
-        text.index(word) for word in ("# Error against", "- device: ", "## Findings", "](pareto.png)", "| svd |")
-    ]
+    words = ("# Error against", "cores usable", "keeps the contract on all", "](pareto.png)", "| svd |", "- device: ")
+    positions = [text.index(word) for word in words]
     assert positions == sorted(positions)
     for word in (jaxrot.__version__, jax.__version__, np.__version__, "float32, float64", "cores usable", "commit"):
-        assert word in text[: positions[2]]
+        assert word in text[text.index("## Where this was measured") :]
     assert "1 of the 40 matrices of own.npy hold a NaN" in text
+
+
+def test_the_page_says_the_same_and_needs_no_other_file(report):
+    page = (report / "report.html").read_text(encoding="utf-8")
+    assert "keeps the contract on all" in page
+    assert page.count("data:image/png;base64,") == 1
+    assert "pareto.png" not in page
+
+
+def test_a_report_is_compared_with_an_earlier_one(report, own_matrices, tmp_path, capsys):
+    np.save(tmp_path / "own.npy", own_matrices)
+    words = ["report", "--quick", "--input", tmp_path / "own.npy", "--out", tmp_path / "out", "--methods", "foam"]
+    words += ["--batch", "7", "--compare", report / "report.json"]
+    assert main([str(word) for word in words]) == 0
+    assert "Against report.json" in capsys.readouterr().out
+    comparison = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))["comparison"]
+    assert [(entry["method"], entry["batch"]) for entry in comparison["times"]] == [("foam", 7)]
+    assert [entry["verdict"] for entry in comparison["errors"]] == [""]
+    assert "## Against an earlier run" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
 
 
 def test_csv_and_json_agree(report):

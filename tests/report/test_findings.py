@@ -1,10 +1,15 @@
+import numpy as np
 import pytest
 
 import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
-from jaxrot.report.findings import findings, largest_batch
+from jaxrot.report.contenders import Beside, Contender, Quantiles, Spread, beyond_front
+from jaxrot.report.content import Content
+from jaxrot.report.findings import faster_outside, findings, largest_batch
+from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Results
+from jaxrot.report.warm_starts import COLD_START, WarmStart
 
 DEFAULT = jaxrot.DEFAULT_METHOD
 
@@ -18,17 +23,26 @@ def timing(method, median, *, spread=0.1, batch=100, dtype="float32"):
     return Timing(method, dtype, batch, median, median * (1 - spread), median * (1 + spread), median / 2, 9, 1, 0.5)
 
 
-def said(accuracies, timings):
-    return "\n".join(findings(Results(accuracies, timings, ()), ["float32"], "mine"))
+def said(accuracies, timings, **parts):
+    given = Input("mine", {"own": np.ones((10, 3, 3))})
+    dtypes = tuple(dict.fromkeys(entry.dtype for entry in timings))
+    return "\n".join(findings(Content(given, {}, {}, dtypes, Results(accuracies, timings, ()), **parts)))
+
+
+def contender(name, time, error, *, is_own=False, spread=0.1, gradient=None):
+    around = Spread(time, time * (1 - spread), time * (1 + spread))
+    quantiles = Quantiles(error / 2, error, 2 * error)
+    errors, times = (Quantiles(*[gradient] * 3), Spread(*(2 * value for value in around))) if gradient else (None, None)
+    head = (name, "", is_own, "float32", "float32", 1, 100, 0, 0)
+    return Contender(*head, quantiles, around, errors, 0, (), times)
 
 
 def test_the_fastest_within_the_contract_is_named_and_compared():
-    text = said(
-        [accuracy("svd"), accuracy(DEFAULT), accuracy("foam", outside=3)],
-        [timing("svd", 1000), timing(DEFAULT, 100), timing("foam", 20)],
-    )
-    assert f"**{DEFAULT}**: 100 ns a matrix at batch 100, 10 times faster than svd" in text
-    assert "foam (20 ns, outside on 3)" in text
+    times = [timing("svd", 1000), timing(DEFAULT, 100), timing("foam", 20)]
+    accuracies = [accuracy("svd"), accuracy(DEFAULT), accuracy("foam", outside=3)]
+    text = said(accuracies, times)
+    assert f"is **{DEFAULT}** in float32, 100 ns a matrix at batch 100, 10 times faster than svd." in text
+    assert "foam (20 ns, outside on 3)" in faster_outside(Results(accuracies, times, ()), "float32")
 
 
 def test_a_difference_within_the_spread_is_none():
@@ -39,7 +53,46 @@ def test_a_difference_within_the_spread_is_none():
 
 def test_nobody_within_the_contract_is_said():
     text = said([accuracy("svd", 4), accuracy(DEFAULT, 2, 2)], [timing("svd", 110), timing(DEFAULT, 100)])
-    assert f"no method measured keeps the contract on all 10 matrices of mine; {DEFAULT} comes closest" in text
+    assert f"No method measured keeps the contract on all 10 matrices of mine: {DEFAULT} comes closest" in text
+
+
+def test_a_report_opens_with_three_sentences():
+    beside = Beside([contender(DEFAULT, 100, 1e-7, is_own=True), contender("other", 500, 1e-6)], [])
+    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], beside=beside)
+    assert text.count("\n") == 2
+    assert "for values no peer lies below and left of jaxrot's front" in text
+    assert f"other takes 5 times as long as {DEFAULT} in float32" in text
+    assert "gradients" not in text, "there was none"
+
+
+@pytest.mark.parametrize(
+    ("time", "error", "is_beyond"),
+    [(500, 1e-8, True), (50, 1e-6, True), (95, 1e-6, False), (500, 1e-6, False), (100, 1e-7, False)],
+)
+def test_a_peer_is_beyond_the_front_where_no_method_is_as_accurate_and_as_fast(time, error, is_beyond):
+    contenders = [contender(DEFAULT, 100, 1e-7, is_own=True), contender("peer", time, error)]
+    assert [entry.name for entry in beyond_front(contenders, of_gradients=False)] == ["peer"] * is_beyond
+    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], beside=Beside(contenders, []))
+    assert ("**peer in float32 lies beyond jaxrot's front**" in text) == is_beyond
+
+
+def test_gradients_have_a_front_of_their_own():
+    contenders = [
+        contender(DEFAULT, 100, 1e-7, is_own=True, gradient=1e-3),
+        contender("peer", 500, 1e-6, gradient=1e-6),
+    ]
+    assert beyond_front(contenders, of_gradients=False) == []
+    assert [entry.name for entry in beyond_front(contenders, of_gradients=True)] == ["peer"]
+
+
+@pytest.mark.parametrize(("time", "words"), [(50, "1 newton in float32 takes 0.5 times"), (95, "by the spread")])
+def test_a_warm_start_is_called_faster_only_beyond_the_spread(time, words):
+    def warm(step, iterations, time, error):
+        around = Spread(time, time * 0.9, time * 1.1)
+        return WarmStart(step, "float32", iterations, 100, Quantiles(error, error, error), around)
+
+    entries = (warm(COLD_START, 0, 100, 1e-7), warm("torque", 1, 10, 1e-2), warm("newton", 1, time, 1.5e-7))
+    assert words in said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], warm_starts=entries)
 
 
 @pytest.mark.parametrize("group", ["input", "families"])

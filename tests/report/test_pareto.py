@@ -3,16 +3,17 @@ import itertools
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from jaxrot.report.labels import place_labels
-from jaxrot.report.pareto import Panel, Point, draw_pareto, pareto_front
+from jaxrot.report.pareto import EXACT, PEER, Panel, Point, draw_pareto, pareto_front
 
 
 def point(name, time, error):
-    return Point(name, time, error, error / 3, error * 30, is_exact=True)
+    return Point(name, time, error, error / 3, error * 30, EXACT)
 
 
 def names(points):
@@ -84,3 +85,22 @@ def test_labels_overlap_neither_each_other_nor_a_point(count):
     assert not [1 for box in boxes for x, y in pixels.tolist() if box.contains(x, y)]
     inside = axes.get_window_extent()
     assert all(inside.x0 <= box.x0 and box.x1 <= inside.x1 for box in boxes)
+
+
+def test_a_peer_does_not_move_the_front(monkeypatch):
+    fronts = []
+    monkeypatch.setattr(Axes, "plot", spied(Axes.plot, fronts))
+    own, peer = point("own", 20, 1e-6), point("peer", 10, 1e-7)._replace(kind=PEER)
+    draw_pareto([Panel("float32", 1000, [own, peer])], "title")
+    assert [list(times) for times, _ in fronts] == [[20]]
+
+
+def spied(plot, fronts):
+    """`Axes.plot` that also notes what is drawn as steps, which the front alone is."""
+
+    def plot_and_note(axes, x, y, *arguments, **options):
+        if options.get("drawstyle") == "steps-post":
+            fronts.append((x, y))
+        return plot(axes, x, y, *arguments, **options)
+
+    return plot_and_note

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxrot.__main__ import main
-from jaxrot.report import command, measurement, render
+from jaxrot.report import command, document, measurement, records, sections
 
 
 def _save_text(path):
@@ -94,6 +94,10 @@ def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
         (["--batch", "-5"], "expected whole numbers from 1"),
         (["--batch", "100000000000"], "expected whole numbers from 1"),
         (["--batch", ""], "expected whole numbers from 1"),
+        (
+            ["--compare", "missing.json"],
+            "missing.json: cannot be read (no such file or directory)",
+        ),
         (["--no-such-option"], "unrecognized arguments: --no-such-option"),
         (["--methods"], "expected one argument"),
     ],
@@ -101,6 +105,17 @@ def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
 def test_a_bad_option_is_refused_in_one_line(words, expected, tmp_path, capsys):
     assert expected in _refused(["report", "--out", tmp_path / "out", *words], capsys)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("{", "this is no JSON"), ("[1]", "holds no report"), ('{"timing": []}', "holds no report"), ("\xff", "no text")],
+)
+def test_a_file_that_is_no_report_is_not_compared_with(text, expected, tmp_path, capsys):
+    (tmp_path / "old.json").write_bytes(text.encode("latin-1"))
+    words = ["report", "--compare", tmp_path / "old.json", "--out", tmp_path / "out"]
+    assert expected in _refused(words, capsys)
+    assert not (tmp_path / "out").exists()
 
 
 def test_no_command_is_refused_in_one_line(capsys):
@@ -126,10 +141,13 @@ def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, caps
 
 
 def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command, "measure", lambda *arguments: measurement.Results([], [], ()))
-    for name in ("as_report_markdown", "as_terminal_text", "as_json"):
-        monkeypatch.setattr(render, name, lambda *arguments: "text")
-    monkeypatch.setattr(command, "_picture", lambda *arguments: b"picture")
+    nothing = sections.Measured(measurement.Results([], [], ()), None, ())
+    monkeypatch.setattr(command, "measure", lambda *arguments: nothing)
+    for module, name in (
+        (document, "as_report_markdown"), (document, "as_terminal_text"), (records, "as_json"),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, lambda *arguments: "text")
+    monkeypatch.setattr(command, "draw_pictures", lambda content: {"pareto.png": b"picture"})
 
     def fail(*arguments):
         raise OSError(28, "No space left on device")

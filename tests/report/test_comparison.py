@@ -1,0 +1,113 @@
+import json
+
+import numpy as np
+import pytest
+
+from jaxrot.measuring.accuracy import Accuracy
+from jaxrot.measuring.timing import Timing
+from jaxrot.report.beside_tables import compared_sentence, errors_compared_table, times_compared_table
+from jaxrot.report.comparison import compare, read_report
+from jaxrot.report.content import Content
+from jaxrot.report.inputs import Input
+from jaxrot.report.measurement import WHOLE, Results
+from jaxrot.report.records import as_json
+
+GIVEN = Input("mine", {"own": np.ones((10, 3, 3))})
+SETS = {"own": 10}
+
+
+def timing(method, median, spread=0.05):
+    return Timing(method, "float32", 100, median, median * (1 - spread), median * (1 + spread), median, 9, 1, 0.5)
+
+
+def accuracy(method, error, outside=0, set_name=WHOLE, group="input"):
+    return Accuracy._make([method, "float32", group, set_name, 10, 0, 10, *[error] * 8, outside, 10, 0])
+
+
+def results(times, errors):
+    return Results([accuracy(*entry) for entry in errors], [timing(*entry) for entry in times], ())
+
+
+def written(measured, tmp_path):
+    """The report.json of an earlier run, read back."""
+    path = tmp_path / "old.json"
+    path.write_text(as_json(Content(GIVEN, {"date": "then"}, {}, ("float32",), measured)), encoding="utf-8")
+    return read_report(path)
+
+
+def verdicts(changes):
+    return {change.method: change.verdict for change in changes}
+
+
+FOUR = [("foam", 100), ("svd", 1000), ("taylor", 50), ("cayley", 60)]
+RIGHT = [(method, 1e-7) for method, _ in FOUR]
+
+
+def with_foam(*error):
+    return [("foam", *error), *RIGHT[1:]]
+
+
+def test_only_what_stands_apart_is_called_slower(tmp_path):
+    before = written(results(FOUR, RIGHT), tmp_path)
+    now = results([("foam", 150), ("svd", 1050), ("taylor", 50), ("cayley", 30)], RIGHT)
+    comparison = compare("old.json", before, now, SETS)
+    assert verdicts(comparison.times) == {"foam": "slower", "svd": "", "taylor": "", "cayley": "faster"}
+    assert "slower: foam (float32, batch 100: 1.50); faster: 1; less accurate: none" in compared_sentence(comparison)
+    first = times_compared_table(comparison).rows[0]
+    assert (first[0], first[5], first[-1]) == ("foam", "1.5", "**slower**")
+
+
+def test_a_slower_machine_makes_nobody_slower(tmp_path):
+    before = written(results(FOUR, RIGHT), tmp_path)
+    now = results([(method, 1.5 * median) for method, median in FOUR], RIGHT)
+    comparison = compare("old.json", before, now, SETS)
+    assert comparison.machine == pytest.approx(1.5)
+    assert set(verdicts(comparison.times).values()) == {""}
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "verdict"),
+    [
+        ((1e-7, 0), (2e-7, 0), "worse"),
+        ((1e-7, 0), (1e-7, 3), "worse"),
+        ((1e-7, 3), (1e-7, 0), "better"),
+        ((2e-7, 0), (1e-7, 0), "better"),
+        ((1e-7, 0), (1.01e-7, 0), ""),
+        ((1e-7, 0), (float("inf"), 0), "worse"),
+        ((float("inf"), 0), (float("inf"), 0), ""),
+        ((None, 0), (None, 0), ""),
+    ],
+)
+def test_an_error_that_grew_is_worse(then, now, verdict, tmp_path):
+    before = written(results(FOUR, with_foam(*then)), tmp_path)
+    comparison = compare("old.json", before, results(FOUR, with_foam(*now)), SETS)
+    assert verdicts(comparison.errors) == dict.fromkeys(("svd", "taylor", "cayley"), "") | {"foam": verdict}
+    assert ("**worse**" in errors_compared_table(comparison).rows[0]) == (verdict == "worse")
+
+
+def test_matrices_of_the_families_count_too(tmp_path):
+    part = ("foam", 1e-7, 2, "rank_1", "families")
+    before = written(results(FOUR, RIGHT), tmp_path)
+    comparison = compare("old.json", before, results(FOUR, [*RIGHT, part]), SETS)
+    assert (comparison.errors[0].outside_before, comparison.errors[0].outside_now) == (0, 2)
+
+
+def test_errors_on_another_input_are_not_compared(tmp_path):
+    before = written(results(FOUR, RIGHT), tmp_path)
+    comparison = compare("old.json", before, results(FOUR, RIGHT), {"own": 11})
+    assert comparison.errors == ()
+    assert "another input" in comparison.remarks[0]
+
+
+def test_nothing_in_common_is_said(tmp_path):
+    before = written(results([("foam", 100)], RIGHT[:1]), tmp_path)
+    comparison = compare("old.json", before, results([("svd", 100)], [("svd", 1e-7)]), SETS)
+    assert "No method was timed in both runs" in comparison.remarks[0]
+    assert comparison.times == comparison.errors == ()
+
+
+def test_a_comparison_is_json_too(tmp_path):
+    before = written(results(FOUR, RIGHT), tmp_path)
+    comparison = compare("old.json", before, results(FOUR, RIGHT), SETS)
+    content = Content(GIVEN, {}, {}, ("float32",), results(FOUR, RIGHT), comparison=comparison)
+    assert json.loads(as_json(content))["comparison"]["times"][0]["method"] == "foam"
