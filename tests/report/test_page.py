@@ -4,8 +4,7 @@ import html.parser
 from jaxrot.report.page import as_page
 
 TEXT = (
-    "# Title ‖R‖\n\nA **finding**.\n\n![What is seen](a.png)\n\n"
-TEXT += "| method | ns |\n| :--- | ---: |\n| `foam` | **12** |\n"
+    "# Title ‖R‖\n\nA **finding**.\n\n![What is seen](a.png)\n\n| method | ns |\n| :--- | ---: |\n| `foam` | **12** |\n"
 )
 
 
