@@ -1,0 +1,209 @@
+"""The pictures of `stability`: how far each method is from the contract, over the singular values and over the scale."""
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jaxrot.report.stability import Cells, ConditionMap, Kind, ScaleMap, summarise_conditions
+
+# Upper ends of the levels, in powers of 10, as multiples of the contract's bound; the first two are within it. Where an
+# approximation lies, between 1e-3 and 1 of a rotation, each dtype has fine levels.
+_LEVELS = {"float32": (-1, 0, 1, 2, 3, 4, 5, 6), "float64": (-1, 0, 1, 3, 6, 12, 13, 14)}
+# Within the contract two pale greens, outside it steps of cividis, from light to dark, which is of even steps with and
+# without seeing red or green. The failures of another kind have what it does not hold: Okabe and Ito's vermilion, and
+# black.
+_WITHIN = ("#EEF6F0", "#D3E8DA")
+_DARKEST, _LIGHTEST = 0.16, 0.97
+_NOT_A_ROTATION, _NOT_FINITE = "#D55E00", "#000000"
+_LINE = {"color": "0.25", "linewidth": 0.6}
+_COLUMNS = 6
+# In a picture's last places stands its legend, in its first an explanation of the axes.
+_PLACES_AROUND = 3
+
+
+def sorted_methods(found: Sequence[ConditionMap]) -> list[str]:
+    """The methods by the share of the cells where they keep the contract, of those alike the less failing first."""
+
+    def badness(name: str) -> tuple[float, float]:
+        shares = [summarise_conditions(part)[name] for part in found]
+        failing = sum(share["not_finite"] + share["not_a_rotation"] for share in shares)
+        return -sum(share["kept"] for share in shares), failing
+
+    return sorted(found[0].methods, key=badness)
+
+
+def color_cells(cells: Cells, dtype: str) -> np.ndarray:
+    """The colour of each cell, shape (cells, 3), red, green and blue from 0 to 1."""
+    from matplotlib.colors import to_rgb
+
+    palette = np.array([to_rgb(color) for color in _palette()])
+    level = np.searchsorted(10.0 ** np.array(_LEVELS[dtype]), cells.excess)
+    level[cells.kind == Kind.NOT_A_ROTATION] = len(palette) - 2
+    level[cells.kind == Kind.NOT_FINITE] = len(palette) - 1
+    return palette[level]
+
+
+def draw_condition_maps(found: ConditionMap, names: Sequence[str]) -> bytes:
+    """A map a method over s2/s1 and s3/s1, as PNG.
+
+    Args:
+        found: The maps of one dtype.
+        names: Which methods to draw, in this order.
+    """
+    figure = _figure((10, 2.35 * _rows(len(names)) + 0.7))
+    all_axes = figure.subplots(_rows(len(names)), _COLUMNS, squeeze=False)
+    keeping = sum(share["kept"] == 1 for name, share in summarise_conditions(found).items() if name in names)
+    figure.suptitle(
+        f"Error over the singular values, {found.dtype}: {keeping} of {len(names)} methods keep the contract on"
+        f" the whole map\nWorst of {found.matrices_a_cell} matrices with s1 = 1 at each of {len(found.s2):,} points;"
+        " the number is the share of them where the contract is kept",
+        fontsize=11,
+    )
+    key, *places = all_axes.ravel()
+    _explain_region(key)
+    for number, name in enumerate(names):
+        _draw_region(places[number], found, name)
+        if (number + 1) % _COLUMNS:
+            places[number].tick_params(labelleft=False)
+    for axes in places[len(names) :]:
+        axes.axis("off")
+    _add_legend(places[len(names)], found.dtype, loc="upper left", bbox_to_anchor=(-0.1, 1.0))
+    return _as_png(figure)
+
+
+def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
+    """The methods over the scale, as PNG: a column of panels a dtype, one panel each sign of the determinant.
+
+    Args:
+        found: The maps, one a dtype.
+        names: Which methods to draw, in this order from top to bottom.
+    """
+    figure = _figure((2.2 + 4 * len(found), 2.6 + 0.3 * len(names)))
+    all_axes = figure.subplots(2, len(found), sharey=True, sharex="col", squeeze=False)
+    figure.suptitle(
+        f"Error over the scale of well-conditioned matrices: worst of {found[0].matrices_a_cell}, the same at each"
+        " scale\nA row of one colour: the method does not depend on the scale",
+        fontsize=11,
+    )
+    for column, part in zip(all_axes.T, found, strict=True):
+        for axes, is_inverted in zip(column, (False, True), strict=True):
+            _draw_scales(axes, part, names, is_inverted)
+        column[1].set_xlabel("log$_{10}$ s1")
+        _add_legend(column[1], part.dtype, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+    return _as_png(figure)
+
+
+def _palette() -> list[Any]:
+    from matplotlib import colormaps
+
+    outside = colormaps["cividis"](np.linspace(_LIGHTEST, _DARKEST, 7)).tolist()
+    return [*_WITHIN, *outside, _NOT_A_ROTATION, _NOT_FINITE]
+
+
+def _rows(methods: int) -> int:
+    return -(-(methods + _PLACES_AROUND) // _COLUMNS)
+
+
+def _draw_region(axes: Any, found: ConditionMap, name: str) -> None:
+    steps, cells = found.steps, found.methods[name]
+    image = np.ones((2 * steps + 1, steps + 1, 3))
+    row, column = np.rint((found.s3 + 1) * steps).astype(int), np.rint(found.s2 * steps).astype(int)
+    image[row, column] = color_cells(cells, found.dtype)
+    half = 0.5 / steps
+    axes.imshow(
+        image, origin="lower", aspect="auto", interpolation="nearest", extent=(-half, 1 + half, -1 - half, 1 + half)
+    )
+    _outline(axes)
+    axes.set_title(name, fontsize=8.5)
+    kept = np.mean(cells.kind == Kind.KEPT)
+    axes.text(0.05, 0.97, _percent(kept), transform=axes.transAxes, ha="left", va="top", fontsize=8)
+
+
+def _percent(share: float) -> str:
+    """Whole percent; never 0 or 100 where it is not exactly that."""
+    if 0 < share < 0.01:
+        return "< 1 %"
+    return f"{'> 99' if 0.99 < share < 1 else format(100 * share, '.0f')} %"
+
+
+def _outline(axes: Any) -> None:
+    axes.plot((1, 0, 1, 1), (1, 0, -1, 1), **_LINE)
+    axes.plot((0, 1), (0, 0), color="0.4", linewidth=0.5, linestyle=":")
+    axes.set(xlim=(-0.03, 1.03), ylim=(-1.05, 1.05), xticks=(0, 0.5, 1), yticks=(-1, -0.5, 0, 0.5, 1))
+    axes.tick_params(labelsize=7)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _explain_region(axes: Any) -> None:
+    """The place of the first map: what its axes, lines and corners are."""
+    _outline(axes)
+    axes.plot((0, 1), (0, -1), color="0.25", linewidth=2)
+    axes.set_xlabel("s2/s1", fontsize=8, labelpad=1)
+    axes.set_ylabel("s3/s1", fontsize=8, labelpad=-2)
+    words = [
+        (0.97, 0.93, "rotation", "right", "top", 0),
+        (0.97, 0.36, "det A > 0", "right", "center", 0),
+        (0.97, 0.05, "flat", "right", "bottom", 0),
+        (0.04, 0.06, "rank 1", "left", "bottom", 0),
+        (0.97, -0.3, "inverted", "right", "center", 0),
+        (0.97, -0.9, "reflection", "right", "bottom", 0),
+        (0.36, -0.56, "R not unique", "center", "center", -53),
+    ]
+    for x, y, word, horizontal, vertical, angle in words:
+        axes.text(x, y, word, ha=horizontal, va=vertical, rotation=angle, fontsize=7)
+    axes.set_title("the region", fontsize=8.5, style="italic")
+
+
+def _draw_scales(axes: Any, found: ScaleMap, names: Sequence[str], is_inverted: bool) -> None:
+    part = found.is_inverted == is_inverted
+    exponents = found.exponents[part]
+    image = np.stack([color_cells(found.methods[name], found.dtype)[part] for name in names])
+    half = (exponents[1] - exponents[0]) / 2
+    left, right = exponents[0] - half, exponents[-1] + half
+    axes.imshow(image, aspect="auto", interpolation="nearest", extent=(left, right, len(names) - 0.5, -0.5))
+    axes.hlines(np.arange(len(names) - 1) + 0.5, left, right, color="white", linewidth=1)
+    axes.set_yticks(range(len(names)), names, fontsize=7.5)
+    axes.tick_params(axis="x", labelsize=7.5)
+    axes.set_title(f"{found.dtype}, det A {'<' if is_inverted else '>'} 0", fontsize=9)
+    if right > 100:
+        for end in (-38, 38):
+            axes.axvline(end, color="0.2", linewidth=0.7, linestyle="--")
+    subnormal = exponents[~found.is_scored[part]]
+    if subnormal.size:
+        axes.axvline(subnormal.max() + half, color="0.2", linewidth=0.7, linestyle=":")
+
+
+def _add_legend(axes: Any, dtype: str, **place: Any) -> None:
+    from matplotlib.patches import Patch
+
+    powers = _LEVELS[dtype]
+    ends = [f"10$^{{{power}}}$" if power not in (0, 1) else str(10**power) for power in powers]
+    words = [f"to {ends[0]}", f"to {ends[1]}: the contract is kept"]
+    words += [f"to {end}" for end in ends[2:]] + [f"above {ends[-1]}", "not a rotation", "NaN or infinity"]
+    handles = [
+        Patch(facecolor=color, edgecolor="0.5", linewidth=0.4, label=word)
+        for color, word in zip(_palette(), words, strict=True)
+    ]
+    axes.legend(
+        handles=handles, title="error, times the contract's bound", title_fontsize=8, fontsize=7.5, frameon=False,
+        borderaxespad=0, alignment="left", **place,
+    )  # fmt: skip
+
+
+def _figure(size: tuple[float, float]) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    # Not pyplot: it would pick a display and keep the figure for the whole process.
+    figure = Figure(figsize=size, dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _as_png(figure: Any) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
