@@ -1,24 +1,35 @@
-"""The pictures of `stability`: how far each method is from the contract, over the singular values and over the scale."""
+"""The pictures of `stability`: how far each method is from the contract, over singular values and over the scale."""
 
-import io
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from jaxrot.report.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
 from jaxrot.report.stability import Cells, ConditionMap, Kind, ScaleMap, summarise_conditions
 
-# Upper ends of the levels, in powers of 10, as multiples of the contract's bound; the first two are within it. Where an
+CONDITIONS_CAPTION = """\
+Each map is the region |s3| ≤ s2 ≤ s1 = 1 of the signed singular values: its upper corner holds the rotations, its
+left one the matrices of rank 1, the line s3 = 0 those of rank 2, and below it det A < 0. Along its lower edge
+s3 = -s2, and R is not unique: there the forward error is not judged, the other lines of the contract are. *Error*:
+the largest of the errors that the contract bounds, each as a multiple of its bound; its colour is pale where all of
+them are within. *Not a rotation*: a reflection, or ‖RᵀR - 1‖_F > 1e-3. A point shows the worst of its matrices: most
+are U diag(s) Vᵀ with random rotations U and V, the others have symmetries of the cube for U and V, which leaves them
+exactly singular or tied."""
+
+SCALES_CAPTION = """\
+The same matrices, κ < 10, at every scale, from the smallest to the largest power of ten of the dtype; colours as above.
+Left of a dotted line subnormal entries carry R, and nothing is asked but that it be a rotation. Dashed lines: 1e±38,
+the range of float32. A row that flickers between two colours has its error near their border at every scale."""
+
+# Upper ends of the levels, in powers of 10, as multiples of the contract's bound; the first is the contract. Where an
 # approximation lies, between 1e-3 and 1 of a rotation, each dtype has fine levels.
-_LEVELS = {"float32": (-1, 0, 1, 2, 3, 4, 5, 6), "float64": (-1, 0, 1, 3, 6, 12, 13, 14)}
-# Within the contract two pale greens, outside it steps of cividis, from light to dark, which is of even steps with and
-# without seeing red or green. The failures of another kind have what it does not hold: Okabe and Ito's vermilion, and
-# black.
-_WITHIN = ("#EEF6F0", "#D3E8DA")
-_DARKEST, _LIGHTEST = 0.16, 0.97
-_NOT_A_ROTATION, _NOT_FINITE = "#D55E00", "#000000"
+_LEVELS = {"float32": (0, 1, 2, 3, 4, 5, 6), "float64": (0, 1, 3, 6, 12, 13, 14)}
+# The part of viridis that tells them apart: its darkest end would be taken for black.
+_LIGHTEST, _DARKEST = 1.0, 0.12
 _LINE = {"color": "0.25", "linewidth": 0.6}
 _COLUMNS = 6
+_FLOAT32_ENDS = 38  # its largest and smallest normal numbers, as powers of 10
 # In a picture's last places stands its legend, in its first an explanation of the axes.
 _PLACES_AROUND = 3
 
@@ -52,7 +63,7 @@ def draw_condition_maps(found: ConditionMap, names: Sequence[str]) -> bytes:
         found: The maps of one dtype.
         names: Which methods to draw, in this order.
     """
-    figure = _figure((10, 2.35 * _rows(len(names)) + 0.7))
+    figure = new_figure((10, 2.35 * _rows(len(names)) + 0.7))
     all_axes = figure.subplots(_rows(len(names)), _COLUMNS, squeeze=False)
     keeping = sum(share["kept"] == 1 for name, share in summarise_conditions(found).items() if name in names)
     figure.suptitle(
@@ -69,8 +80,10 @@ def draw_condition_maps(found: ConditionMap, names: Sequence[str]) -> bytes:
             places[number].tick_params(labelleft=False)
     for axes in places[len(names) :]:
         axes.axis("off")
-    _add_legend(places[len(names)], found.dtype, loc="upper left", bbox_to_anchor=(-0.1, 1.0))
-    return _as_png(figure)
+    legend = _add_legend(places[len(names)], found.dtype, loc="upper left", bbox_to_anchor=(-0.1, 1.0))
+    # It has two places, of which the layout knows the first.
+    legend.set_in_layout(False)
+    return as_png(figure)
 
 
 def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
@@ -80,7 +93,7 @@ def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
         found: The maps, one a dtype.
         names: Which methods to draw, in this order from top to bottom.
     """
-    figure = _figure((2.2 + 4 * len(found), 2.6 + 0.3 * len(names)))
+    figure = new_figure((2.2 + 4 * len(found), 2.6 + 0.3 * len(names)))
     all_axes = figure.subplots(2, len(found), sharey=True, sharex="col", squeeze=False)
     figure.suptitle(
         f"Error over the scale of well-conditioned matrices: worst of {found[0].matrices_a_cell}, the same at each"
@@ -92,14 +105,14 @@ def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
             _draw_scales(axes, part, names, is_inverted)
         column[1].set_xlabel("log$_{10}$ s1")
         _add_legend(column[1], part.dtype, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
-    return _as_png(figure)
+    return as_png(figure)
 
 
 def _palette() -> list[Any]:
     from matplotlib import colormaps
 
-    outside = colormaps["cividis"](np.linspace(_LIGHTEST, _DARKEST, 7)).tolist()
-    return [*_WITHIN, *outside, _NOT_A_ROTATION, _NOT_FINITE]
+    outside = colormaps["viridis"](np.linspace(_LIGHTEST, _DARKEST, 7)).tolist()
+    return [KEPT, *outside, NOT_A_ROTATION, NOT_FINITE]
 
 
 def _rows(methods: int) -> int:
@@ -115,7 +128,7 @@ def _draw_region(axes: Any, found: ConditionMap, name: str) -> None:
     axes.imshow(
         image, origin="lower", aspect="auto", interpolation="nearest", extent=(-half, 1 + half, -1 - half, 1 + half)
     )
-    _outline(axes)
+    _outline(axes, margin=half)
     axes.set_title(name, fontsize=8.5)
     kept = np.mean(cells.kind == Kind.KEPT)
     axes.text(0.05, 0.97, _percent(kept), transform=axes.transAxes, ha="left", va="top", fontsize=8)
@@ -128,9 +141,10 @@ def _percent(share: float) -> str:
     return f"{'> 99' if 0.99 < share < 1 else format(100 * share, '.0f')} %"
 
 
-def _outline(axes: Any) -> None:
-    axes.plot((1, 0, 1, 1), (1, 0, -1, 1), **_LINE)
-    axes.plot((0, 1), (0, 0), color="0.4", linewidth=0.5, linestyle=":")
+def _outline(axes: Any, margin: float) -> None:
+    """The axes and, so far beyond the outermost points that it hides none of them, the region's edge."""
+    right, left = 1 + margin, -2 * margin
+    axes.plot((right, left, right, right), (right - left, 0, left - right, right - left), **_LINE)
     axes.set(xlim=(-0.03, 1.03), ylim=(-1.05, 1.05), xticks=(0, 0.5, 1), yticks=(-1, -0.5, 0, 0.5, 1))
     axes.tick_params(labelsize=7)
     for side in ("top", "right"):
@@ -139,21 +153,23 @@ def _outline(axes: Any) -> None:
 
 def _explain_region(axes: Any) -> None:
     """The place of the first map: what its axes, lines and corners are."""
-    _outline(axes)
+    _outline(axes, margin=0)
+    axes.plot((0, 1), (0, 0), color="0.4", linewidth=0.7, linestyle=":")
     axes.plot((0, 1), (0, -1), color="0.25", linewidth=2)
     axes.set_xlabel("s2/s1", fontsize=8, labelpad=1)
     axes.set_ylabel("s3/s1", fontsize=8, labelpad=-2)
     words = [
-        (0.97, 0.93, "rotation", "right", "top", 0),
-        (0.97, 0.36, "det A > 0", "right", "center", 0),
-        (0.97, 0.05, "flat", "right", "bottom", 0),
-        (0.04, 0.06, "rank 1", "left", "bottom", 0),
-        (0.97, -0.3, "inverted", "right", "center", 0),
-        (0.97, -0.9, "reflection", "right", "bottom", 0),
-        (0.36, -0.56, "R not unique", "center", "center", -53),
+        (0.86, 1.0, "rotation", "right", 0),
+        (0.96, 0.4, "det A > 0", "right", 0),
+        (0.96, 0.08, "rank 2", "right", 0),
+        (0.0, 0.42, "rank 1", "left", 0),
+        (0.96, -0.32, "det A < 0", "right", 0),
+        (0.86, -1.0, "reflection", "right", 0),
+        (0.34, -0.62, "R not unique", "center", -54),
     ]
-    for x, y, word, horizontal, vertical, angle in words:
-        axes.text(x, y, word, ha=horizontal, va=vertical, rotation=angle, fontsize=7)
+    for x, y, word, side, angle in words:
+        axes.text(x, y, word, ha=side, va="center", rotation=angle, fontsize=7)
+    axes.annotate("", (0, 0.02), (0.06, 0.36), arrowprops={"arrowstyle": "->", **_LINE})
     axes.set_title("the region", fontsize=8.5, style="italic")
 
 
@@ -168,42 +184,21 @@ def _draw_scales(axes: Any, found: ScaleMap, names: Sequence[str], is_inverted: 
     axes.set_yticks(range(len(names)), names, fontsize=7.5)
     axes.tick_params(axis="x", labelsize=7.5)
     axes.set_title(f"{found.dtype}, det A {'<' if is_inverted else '>'} 0", fontsize=9)
-    if right > 100:
-        for end in (-38, 38):
+    if right > 2 * _FLOAT32_ENDS:
+        axes.set_xticks([-300, -200, -100, -_FLOAT32_ENDS, 0, _FLOAT32_ENDS, 100, 200, 300])
+        for end in (-_FLOAT32_ENDS, _FLOAT32_ENDS):
             axes.axvline(end, color="0.2", linewidth=0.7, linestyle="--")
     subnormal = exponents[~found.is_scored[part]]
     if subnormal.size:
         axes.axvline(subnormal.max() + half, color="0.2", linewidth=0.7, linestyle=":")
 
 
-def _add_legend(axes: Any, dtype: str, **place: Any) -> None:
-    from matplotlib.patches import Patch
-
+def _add_legend(axes: Any, dtype: str, **place: Any) -> Any:
     powers = _LEVELS[dtype]
     ends = [f"10$^{{{power}}}$" if power not in (0, 1) else str(10**power) for power in powers]
-    words = [f"to {ends[0]}", f"to {ends[1]}: the contract is kept"]
-    words += [f"to {end}" for end in ends[2:]] + [f"above {ends[-1]}", "not a rotation", "NaN or infinity"]
-    handles = [
-        Patch(facecolor=color, edgecolor="0.5", linewidth=0.4, label=word)
-        for color, word in zip(_palette(), words, strict=True)
-    ]
-    axes.legend(
-        handles=handles, title="error, times the contract's bound", title_fontsize=8, fontsize=7.5, frameon=False,
-        borderaxespad=0, alignment="left", **place,
+    words = [f"to {ends[0]}: the contract is kept", *(f"to {end}" for end in ends[1:])]
+    words += [f"above {ends[-1]}", "not a rotation", "NaN or infinity"]
+    return axes.legend(
+        handles=patches(dict(zip(words, _palette(), strict=True))), title="error, times the contract's bound",
+        title_fontsize=8, fontsize=7.5, frameon=False, borderaxespad=0, alignment="left", **place,
     )  # fmt: skip
-
-
-def _figure(size: tuple[float, float]) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    # Not pyplot: it would pick a display and keep the figure for the whole process.
-    figure = Figure(figsize=size, dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _as_png(figure: Any) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
-    return buffer.getvalue()

@@ -1,8 +1,8 @@
-"""Where each method keeps the contract, and how it fails: over the ratios of the singular values, and over the scale."""
+"""Where each method keeps the contract, and how it fails: over the ratios of the singular values and over the scale."""
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,9 @@ ROTATION_TOLERANCE = 1e-3
 STEPS = 64
 _TURNED, _EXACT = 12, 4
 _MATRICES_A_SCALE = 16
-# Multiples of 10 by which the scale changes, from the smallest to the largest. The wider range of float64 holds that of
+# How much the error of the same matrices may change with the scale by the chance of rounding.
+_STEADY = 4
+# Powers of 10 by which the scale changes, from the smallest to the largest. The wider range of float64 holds that of
 # float32, in steps which meet its ends.
 _EXPONENTS = {"float32": np.arange(-38, 39), "float64": np.arange(-308, 309, 2)}
 
@@ -149,18 +151,24 @@ def summarise_conditions(found: ConditionMap) -> dict[str, dict[str, float]]:
     }
 
 
-def summarise_scales(found: ScaleMap) -> dict[str, dict[str, Any]]:
-    """By method, for each sign of the determinant: the exponents between which the contract is kept.
+def summarise_scales(found: ScaleMap) -> dict[str, dict[str, dict[str, list[int] | None]]]:
+    """By method and by sign of the determinant, two ranges of the scale around 1, as powers of 10.
 
-    That is, kept at scale 1 and at every scale from there to both ends. None where it is not kept at scale 1.
+    "kept": the contract is kept at all scales of the range; None where it is not kept at 1. "like_at_1": the error is
+    at most `_STEADY` times that at 1, whether it is within the contract there or not, and of a kind no worse.
     """
-    return {
-        name: {
-            word: _range_around_one(found.exponents[part], cells.kind[part] == Kind.KEPT)
-            for word, part in (("upright", ~found.is_inverted), ("inverted", found.is_inverted))
+
+    def ranges(cells: Cells, part: np.ndarray) -> dict[str, list[int] | None]:
+        exponents, excess, kind = found.exponents[part], cells.excess[part], cells.kind[part]
+        one = int(np.searchsorted(exponents, 0))
+        is_like = (excess <= _STEADY * excess[one]) & (kind <= max(kind[one], Kind.OUTSIDE))
+        return {
+            "kept": _range_around(one, exponents, kind == Kind.KEPT),
+            "like_at_1": _range_around(one, exponents, is_like),
         }
-        for name, cells in found.methods.items()
-    }
+
+    parts = {"upright": ~found.is_inverted, "inverted": found.is_inverted}
+    return {name: {word: ranges(cells, part) for word, part in parts.items()} for name, cells in found.methods.items()}
 
 
 def _grid(steps: int) -> tuple[np.ndarray, np.ndarray]:
@@ -195,7 +203,7 @@ def _judge_cells(
             excess=np.fmax.reduce(_excess(errors).reshape(shape), axis=1),
             kind=_kind(errors, eps).reshape(shape).max(axis=1),
         )
-    return methods, judged.is_normal.reshape(shape).any(axis=1)
+    return methods, np.asarray(judged.is_normal.reshape(shape).any(axis=1))
 
 
 def _excess(errors: Errors) -> np.ndarray:
@@ -215,11 +223,10 @@ def _kind(errors: Errors, eps: float) -> np.ndarray:
     return kind
 
 
-def _range_around_one(exponents: np.ndarray, is_kept: np.ndarray) -> list[int] | None:
-    one = int(np.searchsorted(exponents, 0))
-    if not is_kept[one]:
+def _range_around(one: int, exponents: np.ndarray, is_good: np.ndarray) -> list[int] | None:
+    if not is_good[one]:
         return None
-    broken = np.flatnonzero(~is_kept)
-    first = np.max(broken[broken < one], initial=-1) + 1
-    last = np.min(broken[broken > one], initial=len(is_kept)) - 1
+    bad = np.flatnonzero(~is_good)
+    first = np.max(bad[bad < one], initial=-1) + 1
+    last = np.min(bad[bad > one], initial=len(is_good)) - 1
     return [int(exponents[first]), int(exponents[last])]
