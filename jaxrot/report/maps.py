@@ -30,7 +30,7 @@ _LIGHTEST, _DARKEST = 1.0, 0.12
 _LINE = {"color": "0.25", "linewidth": 0.6}
 _COLUMNS = 6
 _FLOAT32_ENDS = 38  # its largest and smallest normal numbers, as powers of 10
-# In a picture's last places stands its legend, in its first an explanation of the axes.
+# In the first of a picture's places stands an explanation of the axes, in the last two its legend.
 _PLACES_AROUND = 3
 
 
@@ -80,7 +80,7 @@ def draw_condition_maps(found: ConditionMap, names: Sequence[str]) -> bytes:
             places[number].tick_params(labelleft=False)
     for axes in places[len(names) :]:
         axes.axis("off")
-    legend = _add_legend(places[len(names)], found.dtype, loc="upper left", bbox_to_anchor=(-0.1, 1.0))
+    legend = _add_legend(places[-2], found.dtype, loc="upper left", bbox_to_anchor=(-0.1, 1.0))
     # It has two places, of which the layout knows the first.
     legend.set_in_layout(False)
     return as_png(figure)
@@ -96,9 +96,9 @@ def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
     figure = new_figure((2.2 + 4 * len(found), 2.6 + 0.3 * len(names)))
     all_axes = figure.subplots(2, len(found), sharey=True, sharex="col", squeeze=False)
     figure.suptitle(
-        f"Error over the scale of well-conditioned matrices: worst of {found[0].matrices_a_cell}, the same at each"
-        " scale\nA row of one colour: the method does not depend on the scale",
-        fontsize=11,
+        "Error over the scale of well-conditioned matrices\n"
+        f"Worst of {found[0].matrices_a_cell}, the same at each scale; a row of one colour does not depend on it",
+        fontsize=10,
     )
     for column, part in zip(all_axes.T, found, strict=True):
         for axes, is_inverted in zip(column, (False, True), strict=True):

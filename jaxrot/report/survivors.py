@@ -15,15 +15,16 @@ from jaxrot.report.tables import Table
 from jaxrot.report.words import listed
 
 # What a usable rotation may lose of the trace, as a multiple of s1. It grows with the square of the angle between R and
-# R*: about a rotation this is six degrees.
+# R*: near a rotation it allows for six degrees.
 TRACE_TOLERANCE = 1e-2
 
 SURVIVORS_CAPTION = """\
 A method **keeps the contract** on a case if it does on every one of its matrices. It is **usable** if it does not, but
-each R is a rotation, ‖RᵀR - 1‖_F ≤ 1e-3 and det R > 0, and not far from the best, tr(R\\*ᵀA) - tr(RᵀA) ≤ 0.01 s1,
-which near a rotation is an angle of 6°; the dtype does not matter. The others return a wrong rotation, no rotation or
-NaN for at least one matrix. Where subnormal entries carry R, a rotation is all that is asked. Three numbers in
-parentheses are the signed singular values."""
+each R is a rotation, ‖RᵀR - 1‖_F ≤ 1e-3 and det R > 0, and not far from the best, tr(R\\*ᵀA) - tr(RᵀA) ≤ 0.01 s1;
+the dtype does not matter here. Near a rotation that is an angle of 6° at most; for a needle it leaves the turn about
+the long axis open. The others return a rotation that is far off, no rotation or NaN for at least one matrix. Where
+subnormal entries carry R, a rotation is all that is asked. Three numbers in parentheses are the signed singular
+values."""
 
 CASES = {
     "ordinary": ("gaussian",),
@@ -61,7 +62,7 @@ class Grade(IntEnum):
 _WORDS = {
     Grade.KEPT: ("keeps the contract", KEPT),
     Grade.USABLE: ("usable", "#FDE725"),
-    Grade.WRONG: ("a wrong rotation", "#443983"),
+    Grade.WRONG: ("a rotation, but far off", "#443983"),
     Grade.NOT_A_ROTATION: ("not a rotation", NOT_A_ROTATION),
     Grade.NOT_FINITE: ("NaN or infinity", NOT_FINITE),
 }
@@ -120,7 +121,7 @@ def draw_survival(accuracy: Sequence[Accuracy], names: Sequence[str]) -> bytes:
     cases = _cases({family for family, _, _ in grades})
     # A row of its own for the name of each group: None in the place of a family.
     lines = [line for case, families in cases.items() for line in ((case, None), *((case, name) for name in families))]
-    figure = new_figure((2.2 + 0.2 * len(names) * len(dtypes), 2.2 + 0.16 * len(lines)))
+    figure = new_figure((max(7.0, 2.2 + 0.2 * len(names) * len(dtypes)), 2.2 + 0.16 * len(lines)))
     all_axes = figure.subplots(1, len(dtypes), sharey=True, squeeze=False)[0]
     always = [name for name in names if _survives_all(grades, name)]
     figure.suptitle(
