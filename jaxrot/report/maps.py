@@ -93,18 +93,22 @@ def draw_scale_map(found: Sequence[ScaleMap], names: Sequence[str]) -> bytes:
         found: The maps, one a dtype.
         names: Which methods to draw, in this order from top to bottom.
     """
-    figure = new_figure((2.2 + 4 * len(found), 2.6 + 0.3 * len(names)))
-    all_axes = figure.subplots(2, len(found), sharey=True, sharex="col", squeeze=False)
+    row, legend = 0.4 + 0.15 * len(names), 1.2
+    figure = new_figure((2.2 + 4 * len(found), 0.6 + 2 * row + legend))
+    all_axes = figure.subplots(3, len(found), squeeze=False, height_ratios=(row, row, legend))
     figure.suptitle(
         "Error over the scale of well-conditioned matrices\n"
         f"Worst of {found[0].matrices_a_cell}, the same at each scale; a row of one colour does not depend on it",
         fontsize=10,
     )
-    for column, part in zip(all_axes.T, found, strict=True):
-        for axes, is_inverted in zip(column, (False, True), strict=True):
-            _draw_scales(axes, part, names, is_inverted)
-        column[1].set_xlabel("log$_{10}$ s1")
-        _add_legend(column[1], part.dtype, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+    for number, (part, (upright, inverted, below)) in enumerate(zip(found, all_axes.T, strict=True)):
+        _draw_scales(upright, part, names, is_inverted=False)
+        _draw_scales(inverted, part, names, is_inverted=True)
+        upright.tick_params(labelbottom=False, labelleft=number == 0)
+        inverted.tick_params(labelleft=number == 0)
+        inverted.set_xlabel("log$_{10}$ s1", fontsize=8.5)
+        below.axis("off")
+        _add_legend(below, part.dtype, loc="upper center", ncols=2)
     return as_png(figure)
 
 
