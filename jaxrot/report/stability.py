@@ -22,7 +22,7 @@ STEPS = 64
 _TURNED, _EXACT = 12, 4
 _MATRICES_A_SCALE = 16
 # How much the error of the same matrices may change with the scale by the chance of rounding.
-_STEADY = 4
+_STEADY = 10
 # Powers of 10 by which the scale changes, from the smallest to the largest. The wider range of float64 holds that of
 # float32, in steps which meet its ends.
 _EXPONENTS = {"float32": np.arange(-38, 39), "float64": np.arange(-308, 309, 2)}
@@ -128,7 +128,7 @@ def map_scales(names: Sequence[str], run: Run, dtype: str, exponents: Sequence[i
         names: The methods.
         run: As in `map_conditions`.
         dtype: "float32" or "float64".
-        exponents: log10 of the scales, ascending; when absent the range of the dtype.
+        exponents: log10 of the scales, ascending, 0 among them; when absent the range of the dtype.
     """
     powers = _EXPONENTS[dtype] if exponents is None else np.asarray(exponents)
     count = _MATRICES_A_SCALE
@@ -155,7 +155,7 @@ def summarise_scales(found: ScaleMap) -> dict[str, dict[str, dict[str, list[int]
     """By method and by sign of the determinant, two ranges of the scale around 1, as powers of 10.
 
     "kept": the contract is kept at all scales of the range; None where it is not kept at 1. "like_at_1": the error is
-    at most `_STEADY` times that at 1, whether it is within the contract there or not, and of a kind no worse.
+    at most `_STEADY` times that at 1, within the contract or not, and R a rotation at least if it is one at 1.
     """
 
     def ranges(cells: Cells, part: np.ndarray) -> dict[str, list[int] | None]:

@@ -100,26 +100,35 @@ def test_a_planted_fault_is_in_its_cell_and_nowhere_else(change, kind, dtype):
     assert (cells.excess[others] <= 1).all()
 
 
+def turned(eps_times):
+    """A turn by a small angle, in eps of float32, about no principal axis of any matrix."""
+    angle = eps_times * np.finfo("float32").eps / 3**0.5
+    return lambda rotation: (rotation + rotation @ (angle * np.array([[0, -1, 1], [1, 0, -1], [-1, 1, 0]]))).astype(
+        "float32"
+    )
+
+
 def test_a_small_error_is_shown_in_its_units():
-    number, size = cell(0.5, 0.25), 100 * np.finfo("float32").eps
-
-    def turn(rotation):
-        return (rotation @ np.array([[1, -size, 0], [size, 1, 0], [0, 0, 1]])).astype("float32")
-
-    cells = map_conditions(["planted"], with_fault(number, turn), "float32", STEPS).methods["planted"]
+    number = cell(0.5, 0.25)
+    cells = map_conditions(["planted"], with_fault(number, turned(100)), "float32", STEPS).methods["planted"]
     # κ = 1/(0.5 + 0.25), and ‖R - R*‖_F is √2 times the angle.
     expected = 100 * 2**0.5 / (1 + 4 / 3)
     np.testing.assert_allclose(cells.forward_units[number], expected, rtol=0.02)
     assert cells.excess[number] >= cells.forward_units[number] / 8
 
 
-def test_where_r_is_not_unique_the_trace_is_judged_instead():
+# Half a turn about a principal axis costs trace and no torque, a small turn the other way round.
+@pytest.mark.parametrize(
+    "change",
+    [lambda rotation: rotation * np.array([1, -1, -1], "float32"), turned(1000)],
+    ids=["trace", "torque"],
+)
+def test_where_r_is_not_unique_trace_and_torque_are_judged(change):
     number = cell(0.5, -0.5)
-    cells = map_conditions(
-        ["planted"], with_fault(number, lambda rotation: rotation[:, [1, 2, 0]]), "float32", STEPS
-    ).methods["planted"]  # fmt: skip
+    cells = map_conditions(["planted"], with_fault(number, change), "float32", STEPS).methods["planted"]
     assert np.isnan(cells.forward_units[number])
     assert cells.kind[number] == Kind.OUTSIDE
+    assert cells.excess[number] > 1
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
