@@ -10,7 +10,7 @@ from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.progress import progress
-from jaxrot.report import bench, bench_document, document, records
+from jaxrot.report import bench, bench_document, document, records, stability
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import dragon_input, read_input, thinned
@@ -85,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
         timing_budget_s=size.timing_budget_s,
         peers_budget_s=size.peers_budget_s if options.peers else None,
         warm_starts_budget_s=size.warm_starts_budget_s if is_everything else None,
+        map_steps=None if options.quick else stability.STEPS,
     )
     before = options.compare and read_report(options.compare)
     check_installed(["markdown", "matplotlib"], "report")
@@ -96,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     with measuring_configuration(), progress(number_of_steps(plan)) as advance:
         measured = measure(plan, given, advance)
     used = {name: str(value) for name, value in vars(options).items() if isinstance(value, str | int | Path)}
-    content = Content(given, environment, used, dtypes, measured.results, measured.beside, measured.warm_starts)
+    content = Content(given, environment, used, dtypes, **measured._asdict())
     if before:
         sets = {name: len(part) for name, part in given.sets.items()}
         content = content._replace(comparison=compare(options.compare.name, before, measured.results, sets))

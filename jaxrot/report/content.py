@@ -7,6 +7,7 @@ from jaxrot.report.comparison import Comparison
 from jaxrot.report.contenders import Beside
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import Results
+from jaxrot.report.stability import ConditionMap, ScaleMap
 from jaxrot.report.warm_starts import WarmStart
 
 
@@ -21,6 +22,8 @@ class Content(NamedTuple):
         results: Every method on the input and the families.
         beside: jaxrot's front and its peers, where peers were asked for.
         warm_starts: Every step.
+        conditions: Stability over the singular values, one map a dtype.
+        scales: Stability over the scale, likewise.
         comparison: With an earlier report.
     """
 
@@ -31,4 +34,6 @@ class Content(NamedTuple):
     results: Results
     beside: Beside | None = None
     warm_starts: tuple[WarmStart, ...] = ()
+    conditions: tuple[ConditionMap, ...] = ()
+    scales: tuple[ScaleMap, ...] = ()
     comparison: Comparison | None = None

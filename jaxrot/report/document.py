@@ -14,6 +14,8 @@ from jaxrot.report.beside_tables import (
 )
 from jaxrot.report.content import Content
 from jaxrot.report.findings import faster_outside, findings, on_input
+from jaxrot.report.maps import CONDITIONS_CAPTION, SCALES_CAPTION
+from jaxrot.report.survivors import SURVIVORS_CAPTION, survivors_table
 from jaxrot.report.tables import Table, accuracy_table, as_markdown, as_text, sets_table, summary_table, timing_table
 from jaxrot.report.warm_starts import ANGLE_DEGREES
 
@@ -39,6 +41,10 @@ _CAPTIONS = {
     picture_names.PEERS: "The methods of jaxrot's front and what other packages offer, values.",
     picture_names.GRADIENTS: "The same, value and gradient together.",
     picture_names.WARM_STARTS: "Every step from a warm start: the numbers are iterations.",
+    picture_names.conditions("float32"): CONDITIONS_CAPTION,
+    picture_names.conditions("float64"): "The same in float64.",
+    picture_names.SCALES: SCALES_CAPTION,
+    picture_names.SURVIVAL: "Who survives the stiff and extreme cases; what each is, is in the table further down.",
 }
 
 _PEERS = """\
@@ -64,7 +70,8 @@ def as_report_markdown(content: Content, pictures: Mapping[str, bytes]) -> str:
         parts.append(compared_sentence(content.comparison))
     parts.append("## Pictures")
     for name in pictures:
-        parts += [f"![{_CAPTIONS[name]}]({name})", _CAPTIONS[name]]
+        first_sentence = " ".join(_CAPTIONS[name].split()).split(". ")[0]
+        parts += [f"![{first_sentence}]({name})", _CAPTIONS[name]]
     parts += ["## Errors and time", *remarks(content), _CONTRACT]
     for dtype in content.dtypes:
         parts += _section(accuracy_table(content.results, dtype, content.given.name))
@@ -89,7 +96,7 @@ def as_report_markdown(content: Content, pictures: Mapping[str, bytes]) -> str:
     parts += ["## Where the contract breaks", _VERDICTS]
     for dtype in content.dtypes:
         parts += _section(sets_table(content.results, dtype, "input", content.given.name))
-        parts += _section(sets_table(content.results, dtype, "families", "Families"))
+    parts += ["## Stiff and extreme cases", SURVIVORS_CAPTION, *_section(survivors_table(content.results.accuracy))]
     parts += ["## Where this was measured", header(content.environment)]
     return "\n\n".join(parts) + "\n"
 

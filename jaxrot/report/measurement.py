@@ -29,6 +29,7 @@ class Plan(NamedTuple):
         timing_budget_s: Seconds for all timing of methods together, roughly.
         peers_budget_s: Seconds for the rounds with peers in both dtypes; None leaves peers out.
         warm_starts_budget_s: Seconds for the rounds of warm starts in both dtypes; None leaves them out.
+        map_steps: Steps of the stability maps along s2/s1, a power of two; None leaves them out.
     """
 
     methods: tuple[str, ...]
@@ -39,6 +40,7 @@ class Plan(NamedTuple):
     timing_budget_s: float
     peers_budget_s: float | None = None
     warm_starts_budget_s: float | None = None
+    map_steps: int | None = None
 
 
 class Results(NamedTuple):
@@ -75,13 +77,18 @@ def number_of_steps(plan: Plan) -> int:
     return batches * (len(plan.methods) + 1) + len(plan.methods)
 
 
-def measure_methods(plan: Plan, judged: Mapping[str, Judged], advance: Callable[[str], object]) -> Results:
+def measure_methods(
+    plan: Plan, judged: Mapping[str, Judged], advance: Callable[[str], object]
+) -> tuple[Results, Callable[[str, np.ndarray], np.ndarray]]:
     """Judges and times every method of the plan, inside `measuring_configuration`.
 
     Args:
         plan: What to measure.
         judged: "input" and "families", in one dtype.
         advance: Called before each step with what it is.
+
+    Returns:
+        What came of it, and the compiled methods: from a name and matrices (n, 3, 3) to rotations.
     """
     matrices = judged["input"].matrices
     dtype = matrices.dtype.name
@@ -109,7 +116,13 @@ def measure_methods(plan: Plan, judged: Mapping[str, Judged], advance: Callable[
 
     for batch in plan.batches:
         compile_all(batch)
-    accuracy = _judge_methods(plan, judged, compiled, advance)
+
+    def run(name: str, some: np.ndarray) -> np.ndarray:
+        # A method compiled for timing judges too, in chunks of its batch size: compiling is what costs.
+        chunk = min(compiled, key=lambda batch: _cost_of_chunks(len(some), batch))
+        return run_in_chunks(compiled[chunk][name].call, some, chunk)
+
+    accuracy = _judge_methods(plan, judged, run, advance)
     for position, batch in enumerate(plan.batches):
         begin = time.perf_counter()
         time_all(batch, (budget - spent) / (len(plan.batches) - position + (plan.batch_if_time_permits is not None)))
@@ -122,24 +135,20 @@ def measure_methods(plan: Plan, judged: Mapping[str, Judged], advance: Callable[
             time_all(extra, needed)
         else:
             remarks.append(f"Batch {extra:,} in {dtype} was left out to save {needed:.0f} s; --batch {extra} times it.")
-    return Results(accuracy, timing, tuple(remarks))
+    return Results(accuracy, timing, tuple(remarks)), run
 
 
 def _judge_methods(
     plan: Plan,
     judged: Mapping[str, Judged],
-    compiled: Mapping[int, Mapping[str, Compiled]],
+    run: Callable[[str, np.ndarray], np.ndarray],
     advance: Callable[[str], object],
 ) -> list[Accuracy]:
-    # A method compiled for timing judges too, in chunks of its batch size: compiling is what costs.
-    total = sum(len(part.matrices) for part in judged.values())
-    chunk = min(compiled, key=lambda batch: _cost_of_chunks(total, batch))
     accuracy = []
     for name in plan.methods:
         advance(f"judging {name}")
         for group, part in judged.items():
-            rotation = run_in_chunks(compiled[chunk][name].call, part.matrices, chunk)
-            errors = measure_errors(rotation, part)
+            errors = measure_errors(run(name, part.matrices), part)
             accuracy.extend(summarise(name, jaxrot.METHODS[name], errors, part, group))
     return accuracy
 

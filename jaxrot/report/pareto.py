@@ -1,12 +1,12 @@
 """Error against time as a picture, and which methods nothing else beats in both."""
 
-import io
 import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxrot.report.figures import as_png, new_figure
 from jaxrot.report.labels import place_labels
 
 # Okabe and Ito's colours, told apart without seeing red or green; shape and filling tell the kinds apart in grey too.
@@ -68,12 +68,7 @@ def pareto_front(points: Sequence[Point]) -> list[Point]:
 
 def draw_pareto(panels: Sequence[Panel], title: str, error_name: str = _VALUE_ERROR) -> bytes:
     """The picture as PNG, one panel a dtype. The front is jaxrot's own; a filled peer is beyond it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    # Not pyplot: it would pick a display and keep the figure for the whole process.
-    figure = Figure(figsize=(1.5 + 5.7 * len(panels), 5.8), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure((1.5 + 5.7 * len(panels), 5.8))
     all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
     figure.suptitle(title, fontsize=11)
     for axes, panel in zip(all_axes, panels, strict=True):
@@ -96,9 +91,7 @@ def draw_pareto(panels: Sequence[Panel], title: str, error_name: str = _VALUE_ER
             for error in np.geomspace(_clip(point.error_median, floor), _clip(point.error_max, floor), 12)
         ]
         place_labels(axes, labels, whiskers + _front_line(panel, floor))
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
-    return buffer.getvalue()
+    return as_png(figure)
 
 
 def _own_front(panel: Panel) -> list[Point]:

@@ -6,11 +6,19 @@ import jaxrot
 from jaxrot.report.contenders import Contender, Quantiles, Spread
 from jaxrot.report.content import Content
 from jaxrot.report.findings import on_input, times_at_largest_batch
+from jaxrot.report.maps import draw_condition_maps, draw_scale_map, sorted_methods
 from jaxrot.report.measurement import Results
 from jaxrot.report.pareto import APPROXIMATION, EXACT, PEER, Panel, Point, draw_pareto
+from jaxrot.report.survivors import draw_survival
 from jaxrot.report.warm_picture import draw_warm_starts
 
 METHODS, PEERS, GRADIENTS, WARM_STARTS = "pareto.png", "peers.png", "gradients.png", "warm_starts.png"
+SCALES, SURVIVAL = "stability_scales.png", "survival.png"
+
+
+def conditions(dtype: str) -> str:
+    """The name of a dtype's map over the singular values."""
+    return f"stability_{dtype}.png"
 
 
 def draw_pictures(content: Content) -> dict[str, bytes]:
@@ -35,6 +43,13 @@ def draw_pictures(content: Content) -> dict[str, bytes]:
             )
     if content.warm_starts:
         pictures[WARM_STARTS] = draw_warm_starts(content.warm_starts, content.given.name)
+    names = list(dict.fromkeys(entry.method for entry in content.results.accuracy))
+    if content.conditions:
+        names = sorted_methods(content.conditions)
+        for found in content.conditions:
+            pictures[conditions(found.dtype)] = draw_condition_maps(found, names)
+        pictures[SCALES] = draw_scale_map(content.scales, names)
+    pictures[SURVIVAL] = draw_survival(content.results.accuracy, names)
     return pictures
 
 

@@ -13,6 +13,7 @@ from jaxrot.report.bench import Bench
 from jaxrot.report.content import Content
 from jaxrot.report.findings import findings
 from jaxrot.report.measurement import WHOLE, Results
+from jaxrot.report.stability import summarise_conditions, summarise_scales
 
 
 def as_json(content: Content) -> str:
@@ -29,6 +30,10 @@ def as_json(content: Content) -> str:
             "timing": content.results.timing,
             "peers": None if beside is None else beside,
             "warm_starts": content.warm_starts,
+            "stability": {
+                "conditions": {found.dtype: summarise_conditions(found) for found in content.conditions},
+                "scales": {found.dtype: summarise_scales(found) for found in content.scales},
+            },
             "comparison": content.comparison,
         }
     )

@@ -14,6 +14,7 @@ from jaxrot.report.measurement import WHOLE, Plan, Results, measure_methods
 from jaxrot.report.measurement import number_of_steps as steps_of_methods
 from jaxrot.report.pareto import pareto_front
 from jaxrot.report.pictures import methods_panel
+from jaxrot.report.stability import ConditionMap, ScaleMap, map_conditions, map_scales
 from jaxrot.report.warm_starts import WarmStart, measure_warm_starts
 
 
@@ -23,6 +24,8 @@ class Measured(NamedTuple):
     results: Results
     beside: Beside | None
     warm_starts: tuple[WarmStart, ...]
+    conditions: tuple[ConditionMap, ...] = ()
+    scales: tuple[ScaleMap, ...] = ()
 
 
 def number_of_steps(plan: Plan) -> int:
@@ -32,7 +35,7 @@ def number_of_steps(plan: Plan) -> int:
         steps += beside.number_of_steps(plan.methods)
     if plan.warm_starts_budget_s is not None:
         steps += warm_starts.number_of_steps(with_peers=plan.peers_budget_s is not None)
-    return len(plan.dtypes) * steps
+    return len(plan.dtypes) * (steps + (plan.map_steps is not None))
 
 
 def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measured:
@@ -44,16 +47,21 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
         advance: Called before each step with what it is.
     """
     results, contenders, skipped, starts = Results([], [], ()), [], {}, []
+    conditions, scales = [], []
     for dtype in plan.dtypes:
         advance(f"{dtype}: the reference")
         judged = {
             "input": judge(given.sets, dtype, whole=WHOLE),
             "families": judge(_families(plan.matrices_a_family, dtype), dtype),
         }
-        found = measure_methods(plan, judged, advance)
+        found, run = measure_methods(plan, judged, advance)
         results = Results(
             results.accuracy + found.accuracy, results.timing + found.timing, results.remarks + found.remarks
         )
+        if plan.map_steps is not None:
+            advance(f"{dtype}: stability maps")
+            conditions.append(map_conditions(plan.methods, run, dtype, plan.map_steps))
+            scales.append(map_scales(plan.methods, run, dtype))
         if plan.peers_budget_s is not None:
             front = [point.name for point in pareto_front(methods_panel(found, dtype).points)]
             measured = beside.measure_beside(
@@ -69,7 +77,8 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
                 with_peers=plan.peers_budget_s is not None,
                 advance=advance,
             )
-    return Measured(results, None if plan.peers_budget_s is None else Beside(contenders, list(skipped)), tuple(starts))
+    peers = None if plan.peers_budget_s is None else Beside(contenders, list(skipped))
+    return Measured(results, peers, tuple(starts), tuple(conditions), tuple(scales))
 
 
 def _families(count: int, dtype: str) -> dict[str, np.ndarray]:

@@ -1,10 +1,10 @@
 """Warm starts as a picture: a line for every step, its points the numbers of iterations."""
 
-import io
 from collections.abc import Sequence
 
 import numpy as np
 
+from jaxrot.report.figures import as_png, new_figure
 from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, WarmStart
 
 # Okabe and Ito's colours; the marker tells the lines apart in grey.
@@ -20,13 +20,8 @@ _STYLES = {
 
 def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
     """The picture as PNG, one panel a dtype."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     dtypes = list(dict.fromkeys(entry.dtype for entry in entries))
-    # Not pyplot: it would pick a display and keep the figure for the whole process.
-    figure = Figure(figsize=(1.5 + 5.7 * len(dtypes), 5.4), dpi=150, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure((1.5 + 5.7 * len(dtypes), 5.4))
     figure.suptitle(
         f"Warm starts, {ANGLE_DEGREES:.0f}° off: error after k iterations against time ({input_name})", fontsize=11
     )
@@ -61,6 +56,4 @@ def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
         axes.set_xlabel("time a matrix, all iterations [ns], median")
         axes.set_ylabel("forward error ‖R - R*‖$_F$, 99th percentile")
     figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
-    return buffer.getvalue()
+    return as_png(figure)

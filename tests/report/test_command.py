@@ -14,7 +14,7 @@ from jaxrot.__main__ import main
 from jaxrot.report import command, measurement
 from jaxrot.report.inputs import Input, read_input, thinned
 
-FILES = {"report.md", "report.html", "report.csv", "report.json", "pareto.png"}
+FILES = {"report.md", "report.html", "report.csv", "report.json", "pareto.png", "survival.png"}
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +44,7 @@ def test_the_dragon_is_the_default_input(tmp_path, capsys, monkeypatch):
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "Stanford University Computer Graphics Laboratory" in text
     assert "| scrambled | 5 |" in text
+    assert "`minus_identity`" in text
 
 
 def test_all_files_are_written_and_nothing_else(report):
@@ -65,7 +66,7 @@ def test_markdown_opens_with_findings_then_pictures_then_tables(report):
 def test_the_page_says_the_same_and_needs_no_other_file(report):
     page = (report / "report.html").read_text(encoding="utf-8")
     assert "keeps the contract on all" in page
-    assert page.count("data:image/png;base64,") == 1
+    assert page.count("data:image/png;base64,") == 2
     assert "pareto.png" not in page
 
 
