@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
+from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment
 from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
@@ -14,7 +15,7 @@ from jaxrot.console.progress import progress
 from jaxrot.report import bench, render
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.inputs import Input, dragon_input, read_input, thinned
-from jaxrot.report.measurement import Plan, Results, measure, measuring_configuration, number_of_steps
+from jaxrot.report.measurement import Plan, Results, measure, number_of_steps
 from jaxrot.report.pareto import Panel, Point, draw_pareto
 
 _DTYPES = {"float32": ("float32",), "float64": ("float64",), "both": ("float32", "float64")}

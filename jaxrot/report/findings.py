@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
+from jaxrot.measuring.words import listed, number
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.words import listed, number
 
 CONTROL = "svd"
 
