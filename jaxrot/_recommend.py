@@ -22,7 +22,7 @@ def recommend(
 ) -> Recommendation:
     """Measures what can find the nearest rotations of these matrices, and recommends the cheapest that is good enough.
 
-    It compiles up to twenty programs and runs them: seconds, not for the inside of a program. `apply` of the result is.
+    It compiles up to twenty programs and runs them: some seconds to half a minute, once, outside `jit`.
 
     Args:
         matrices: A, real, shape (..., 3, 3), any scale: matrices like those that are to come. Of more than 10,000 a
@@ -50,7 +50,8 @@ def recommend(
           A limit of 1/(8 eps) leaves nothing out.
         - An approximation, where κ > 1, that is s2+s3 < s1. It declares no limit in units of eps, since its error is
           none of rounding; it is for matrices near a rotation, κ = ½.
-        - The steps `cayley` and `quest`, where a start is more than 90° off, in the sample. Steps declare no κ.
+        - The step `cayley` where a start is more than 90° off, `quest` from 170° on; this is asked of the sample. Steps
+          declare no κ.
 
         Where R* is not determined, κ ≥ 1/(8 eps), no error is defined. There R must be a rotation and lose no more
         trace tr(RᵀA) than an error of tolerance / 2 could, rounding apart.
