@@ -109,8 +109,8 @@ class Recommendation(NamedTuple):
             )
         if self.undetermined:
             sentences.append(
-                f"The nearest rotation of {_matrices(self.undetermined)} is not determined: there the lost trace"
-                " tr(RᵀA) was judged."
+                f"The nearest rotation of {_matrices(self.undetermined)} is not determined: there a rotation counts"
+                " as right that loses no trace tr(RᵀA)."
             )
         return sentences
 
