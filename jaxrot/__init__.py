@@ -11,6 +11,8 @@ from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
 from jaxrot._polar import PolarDecomposition as PolarDecomposition
 from jaxrot._polar import polar_decomposition as polar_decomposition
+from jaxrot._recommend import recommend as recommend
+from jaxrot._recommendation import Recommendation as Recommendation
 from jaxrot._refine import refine_quaternion_wxyz as refine_quaternion_wxyz
 from jaxrot._refine import refine_rotation as refine_rotation
 from jaxrot._svd import RotationVariantSVD as RotationVariantSVD
@@ -30,6 +32,7 @@ __all__ = [
     "STEPS",
     "Method",
     "PolarDecomposition",
+    "Recommendation",
     "RotationVariantSVD",
     "Step",
     "TwistModes",
@@ -39,6 +42,7 @@ __all__ = [
     "nearest_quaternion_wxyz",
     "nearest_rotation",
     "polar_decomposition",
+    "recommend",
     "refine_quaternion_wxyz",
     "refine_rotation",
     "rotation_gap",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from jaxrot.console.errors import UserError
+from jaxrot.recommending import command as recommending
 from jaxrot.report import command as report
 from jaxrot.simulate import command as simulate
 
@@ -32,6 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     report_parser = commands.add_parser("report", help="measure error against run time of every method")
     report.add_arguments(report_parser)
     report_parser.set_defaults(run=report.run)
+    recommend_parser = commands.add_parser("recommend", help="the cheapest method for a file of matrices")
+    recommending.add_arguments(recommend_parser)
+    recommend_parser.set_defaults(run=recommending.run)
     simulate_parser = commands.add_parser("simulate", help="run a scene, animate it and watch its health")
     simulate.add_arguments(simulate_parser)
     simulate_parser.set_defaults(run=simulate.run)

@@ -17,14 +17,16 @@ LAYERS = [
     {"_nearest", "_refine", "_svd"},
     {"_conditioning", "_dense", "_polar"},
     {"measuring"},
-    {"_recommend"},
+    {"_sample"},
+    {"_candidates"},
+    {"_recommend", "_recommendation"},
     {"__init__"},
     {"console"},
     {"scenes"},
-    {"report", "simulate"},
+    {"recommending", "report", "simulate"},
     {"__main__"},
 ]
-CORE = {name for layer in LAYERS[:10] for name in layer}
+CORE = {name for layer in LAYERS[:12] for name in layer}
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
 FILES = sorted(PACKAGE.rglob("*.py"))
 

@@ -68,13 +68,21 @@ class Errors(NamedTuple):
     is_outside: np.ndarray
 
 
-def run_in_chunks(call: Callable[[np.ndarray], np.ndarray], matrices: np.ndarray, chunk: int) -> np.ndarray:
-    """Applies a function compiled for one batch size to any number of matrices; the last chunk is filled up."""
+def run_in_chunks(call: Callable[..., np.ndarray], matrices: np.ndarray, chunk: int, *starts: np.ndarray) -> np.ndarray:
+    """Applies a function compiled for one batch size to any number of matrices; the last chunk is filled up.
+
+    Args:
+        call: Of as many arrays (chunk, 3, 3) as are given.
+        matrices: Shape (n, 3, 3), n > 0.
+        chunk: Matrices in a call.
+        *starts: Further arrays of the same shape.
+    """
     results = []
-    for start in range(0, len(matrices), chunk):
-        part = matrices[start : start + chunk]
-        filled = np.concatenate([part, np.broadcast_to(part[:1], (chunk - len(part), 3, 3))])
-        results.append(np.asarray(call(filled))[: len(part)])
+    for begin in range(0, len(matrices), chunk):
+        parts = [array[begin : begin + chunk] for array in (matrices, *starts)]
+        missing = chunk - len(parts[0])
+        filled = [np.concatenate([part, np.broadcast_to(part[:1], (missing, 3, 3))]) for part in parts]
+        results.append(np.asarray(call(*filled))[: len(parts[0])])
     return np.concatenate(results)
 
 

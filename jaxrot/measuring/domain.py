@@ -13,7 +13,7 @@ TORQUE_BOUND = 128
 
 # A method that is not scale-free was derived for matrices near rotations; beyond this factor from unit size it promises
 # nothing.
-_UNIT_SCALE = 2.0
+UNIT_SCALE = 2.0
 
 
 def in_domain(method: Method, judged: Judged) -> np.ndarray:
@@ -33,7 +33,7 @@ def in_domain(method: Method, judged: Judged) -> np.ndarray:
     if not method.handles_inversion:
         inside = inside & (~judged.is_inverted)
     if not method.scale_free:
-        inside = inside & (judged.size <= _UNIT_SCALE) & (judged.size >= 1 / _UNIT_SCALE)
+        inside = inside & (judged.size <= UNIT_SCALE) & (judged.size >= 1 / UNIT_SCALE)
     return inside
 
 

@@ -22,7 +22,7 @@ class Compiled(NamedTuple):
     """A method compiled for one shape.
 
     Attributes:
-        call: From matrices of that shape to rotations.
+        call: From matrices of that shape, and starts where it takes them, to rotations.
         compile_s: Seconds for tracing, lowering and compiling, no cache involved.
     """
 
@@ -58,10 +58,11 @@ class Timing(NamedTuple):
     compile_s: float
 
 
-def compile_method(function: Callable, batch: int, dtype: str) -> Compiled:
-    """Compiles a function of (batch, 3, 3) and takes the time."""
+def compile_method(function: Callable, batch: int, dtype: str, *, arguments: int = 1) -> Compiled:
+    """Compiles a function of one array (batch, 3, 3), or of several, and takes the time."""
     start = time.perf_counter()
-    compiled = jax.jit(function).lower(jax.ShapeDtypeStruct((batch, 3, 3), jnp.dtype(dtype))).compile()
+    shape = jax.ShapeDtypeStruct((batch, 3, 3), jnp.dtype(dtype))
+    compiled = jax.jit(function).lower(*[shape] * arguments).compile()
     return Compiled(compiled, time.perf_counter() - start)
 
 
@@ -124,7 +125,12 @@ def interleave(
 
 
 def time_methods(
-    compiled: Mapping[str, Compiled], matrices: np.ndarray, batch: int, *, budget_s: float
+    compiled: Mapping[str, Compiled],
+    matrices: np.ndarray,
+    batch: int,
+    *,
+    budget_s: float,
+    starts: np.ndarray | None = None,
 ) -> list[Timing]:
     """Times methods on one batch, side by side.
 
@@ -133,11 +139,14 @@ def time_methods(
         matrices: Shape (n, 3, 3), n > 0; the batch is filled with them.
         batch: Matrices in a call.
         budget_s: Seconds to spend, roughly.
+        starts: The rotations that the methods start from, one a matrix, where they take them.
 
     Returns:
         One `Timing` a method, in the same order.
     """
-    on_device = jax.device_put(fill_batch(matrices, batch))
+    arrays = [matrices] if starts is None else [matrices, starts]
+    # Equally many: the same random order, so that every matrix keeps its start.
+    on_device = [jax.device_put(fill_batch(array, batch)) for array in arrays]
     calls = {name: _blocking(method.call, on_device) for name, method in compiled.items()}
     samples, repeats = interleave(calls, budget_s=budget_s)
     timings = []
@@ -161,5 +170,5 @@ def time_methods(
     return timings
 
 
-def _blocking(call: Callable, argument: jax.Array) -> Callable[[], object]:
-    return lambda: jax.block_until_ready(call(argument))
+def _blocking(call: Callable, arguments: list[jax.Array]) -> Callable[[], object]:
+    return lambda: jax.block_until_ready(call(*arguments))

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
+from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment
 from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
@@ -14,7 +15,7 @@ from jaxrot.report import bench, bench_document, document, records, stability
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import dragon_input, read_input, thinned
-from jaxrot.report.measurement import Plan, measuring_configuration
+from jaxrot.report.measurement import Plan
 from jaxrot.report.page import as_page
 from jaxrot.report.pictures import draw_pictures
 from jaxrot.report.sections import measure, number_of_steps

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
+from jaxrot.measuring.words import listed, number
 from jaxrot.report.contenders import Beside, Contender, Spread, beyond_front
 from jaxrot.report.content import Content
 from jaxrot.report.measurement import WHOLE, Results
 from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, WarmStart
-from jaxrot.report.words import listed, number
 
 CONTROL = "svd"
 

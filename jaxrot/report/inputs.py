@@ -20,11 +20,13 @@ class Input(NamedTuple):
         name: What the report calls them.
         sets: Named parts, each float64 of shape (n, 3, 3), n > 0.
         remarks: What the reader must know about how they were read, one sentence each.
+        dtype: "float32" where the numbers need no more than that; "float64" for float64, and wider.
     """
 
     name: str
     sets: dict[str, np.ndarray]
     remarks: tuple[str, ...] = ()
+    dtype: str = "float64"
 
 
 def dragon_input(cluster_count: int) -> Input:
@@ -36,31 +38,35 @@ def dragon_input(cluster_count: int) -> Input:
     return Input(deformed_dragon.NAME, deformed_dragon.dragon_matrices(cluster_count), (remark,))
 
 
-def read_input(path: Path) -> Input:
+def read_input(path: Path, option: str = "--input") -> Input:
     """Reads the user's own matrices.
 
     Every array of shape (..., 3, 3) in an archive becomes a set of its own; what else the archive holds is left out and
     said so.
+
+    Args:
+        path: The file.
+        option: What the user calls it, for the messages.
 
     Raises:
         UserError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
             non-empty array of shape (..., 3, 3).
     """
     if not path.is_file():
-        raise UserError(f"--input {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
-    arrays = _load(path)
+        raise UserError(f"{option} {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
+    arrays = _load(path, option)
     if isinstance(arrays, np.ndarray):
         if (problem := _problem(arrays)) is not None:
-            raise UserError(f"--input {path}: {problem}; {EXPECTED}")
-        return Input(path.name, {path.stem: _flat(arrays)})
+            raise UserError(f"{option} {path}: {problem}; {EXPECTED}")
+        return Input(path.name, {path.stem: _flat(arrays)}, dtype=_dtype([arrays]))
     problems = {name: _problem(array) for name, array in arrays.items()}
     sets = {name: _flat(arrays[name]) for name, problem in problems.items() if problem is None}
     left_out = [f"{name} ({problem})" for name, problem in problems.items() if problem is not None]
     if not sets:
         held = ", ".join(left_out) if left_out else "nothing"
-        raise UserError(f"--input {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
+        raise UserError(f"{option} {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
     remarks = (f"Left out of the file: {', '.join(left_out)}.",) if left_out else ()
-    return Input(path.name, sets, remarks)
+    return Input(path.name, sets, remarks, _dtype([arrays[name] for name in sets]))
 
 
 def thinned(given: Input, most: int) -> Input:
@@ -75,10 +81,10 @@ def thinned(given: Input, most: int) -> Input:
         sets[name] = part[np.sort(random.choice(len(part), count, replace=False))]
     kept = sum(map(len, sets.values()))
     remark = f"A random sample: {kept:,} of the {total:,} matrices in the file."
-    return Input(given.name, sets, (*given.remarks, remark))
+    return given._replace(sets=sets, remarks=(*given.remarks, remark))
 
 
-def _load(path: Path) -> np.ndarray | dict[str, np.ndarray]:
+def _load(path: Path, option: str) -> np.ndarray | dict[str, np.ndarray]:
     # Pickle would run code out of the file; an object array is refused instead. The file is opened here because
     # `np.load` leaves that of a torn archive open.
     try:
@@ -89,7 +95,7 @@ def _load(path: Path) -> np.ndarray | dict[str, np.ndarray]:
         reason = " ".join(str(error).split())
         if "allow_pickle" in reason or "pickled" in reason:
             reason = "it holds Python objects or is no NumPy file"
-        raise UserError(f"--input {path}: cannot be read ({reason}); {EXPECTED}") from None
+        raise UserError(f"{option} {path}: cannot be read ({reason}); {EXPECTED}") from None
 
 
 def _problem(array: np.ndarray) -> str | None:
@@ -107,3 +113,8 @@ def _problem(array: np.ndarray) -> str | None:
 
 def _flat(array: np.ndarray) -> np.ndarray:
     return array.astype(np.float64).reshape(-1, 3, 3)
+
+
+def _dtype(arrays: list[np.ndarray]) -> str:
+    is_wide = any(array.dtype.kind == "f" and array.dtype.itemsize >= 8 for array in arrays)
+    return "float64" if is_wide else "float32"

@@ -1,8 +1,7 @@
 """Every method, judged and timed on one input in one dtype."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import jax
@@ -55,20 +54,6 @@ class Results(NamedTuple):
     accuracy: list[Accuracy]
     timing: list[Timing]
     remarks: tuple[str, ...]
-
-
-@contextmanager
-def measuring_configuration() -> Iterator[None]:
-    """float64 allowed, and no compilation cache: a hit would pass for a short compile time."""
-    wanted = {"jax_enable_x64": True, "jax_enable_compilation_cache": False}
-    before = {name: getattr(jax.config, name) for name in wanted}
-    try:
-        for name, value in wanted.items():
-            jax.config.update(name, value)
-        yield
-    finally:
-        for name, value in before.items():
-            jax.config.update(name, value)
 
 
 def number_of_steps(plan: Plan) -> int:

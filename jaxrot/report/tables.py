@@ -6,10 +6,10 @@ import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.domain import describe_domain
 from jaxrot.measuring.timing import Timing
+from jaxrot.measuring.words import number
 from jaxrot.report.bench import Goal, Stage
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.words import number
 
 
 class Table(NamedTuple):

@@ -95,3 +95,13 @@ def test_chunks_fill_up_and_lose_nothing():
 
     np.testing.assert_array_equal(accuracy.run_in_chunks(double, matrices, 3), 2 * matrices)
     assert shapes == [(3, 3, 3)] * 3
+
+
+def test_chunks_are_filled_up_and_every_matrix_keeps_its_start():
+    matrices = np.arange(5 * 9, dtype=np.float32).reshape(5, 3, 3)
+
+    def call(matrix, start):
+        assert len(matrix) == len(start) == 2
+        return matrix - start
+
+    np.testing.assert_array_equal(accuracy.run_in_chunks(call, matrices, 2, -matrices), 2 * matrices)

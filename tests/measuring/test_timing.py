@@ -85,3 +85,17 @@ def test_times_are_per_matrix_and_compile_time_is_apart():
     assert 0 < entry.fastest_ns <= entry.quartile_1_ns <= entry.median_ns <= entry.quartile_3_ns
     assert entry.median_ns < 1e9 * 0.05 / 64
     assert (entry.method, entry.dtype, entry.batch) == ("double", "float32", 64)
+
+
+def test_every_matrix_keeps_its_start():
+    matrices = np.arange(5 * 9, dtype=np.float32).reshape(5, 3, 3)
+    pairs = []
+
+    def call(matrix, start):
+        pairs.append((np.asarray(matrix), np.asarray(start)))
+        return matrix
+
+    timing.time_methods({"own": timing.Compiled(call, 0.0)}, matrices, 7, budget_s=0.0, starts=-matrices)
+    assert all(matrix.shape == (7, 3, 3) and (matrix == -start).all() for matrix, start in pairs)
+    compiled = timing.compile_method(lambda matrix, start: matrix - start, 4, "float32", arguments=2)
+    assert compiled.call(matrices[:4], -matrices[:4]).tolist() == (2 * matrices[:4]).tolist()

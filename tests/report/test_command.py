@@ -11,6 +11,7 @@ from matplotlib.image import imread
 
 import jaxrot
 from jaxrot.__main__ import main
+from jaxrot.console.configuration import measuring_configuration
 from jaxrot.report import command, measurement
 from jaxrot.report.inputs import Input, read_input, thinned
 
@@ -125,7 +126,7 @@ def test_an_existing_folder_keeps_its_other_files(report, tmp_path, capsys):
 def test_the_configuration_is_left_as_it_was():
     names = ("jax_enable_x64", "jax_enable_compilation_cache")
     before = [getattr(jax.config, name) for name in names]
-    with measurement.measuring_configuration():
+    with measuring_configuration():
         assert [getattr(jax.config, name) for name in names] == [True, False]
     assert [getattr(jax.config, name) for name in names] == before
 

@@ -1,0 +1,216 @@
+"""What can be recommended: the methods whose domain holds the sample, and the steps; how wrong, and how fast."""
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+
+from jaxrot._inputs import check_matrix, check_start
+from jaxrot._nearest import nearest_rotation
+from jaxrot._refine import refine_rotation
+from jaxrot._sample import Sample
+from jaxrot.measuring import domain, reference
+from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
+from jaxrot.measuring.judging import Judged
+from jaxrot.measuring.timing import Compiled, compile_method, time_methods
+from jaxrot.measuring.words import number
+from jaxrot.solvers import Method
+
+# s2 + s3 ≥ s1: an approximation is for matrices near a rotation, κ = 1/2, and at κ = 1 half of the way is left.
+APPROXIMATION_LIMIT = 1.0
+# Degrees from the start to R*, where a step's record bounds them. The error of one `quest` step was 3e-5 from 170° off
+# and 3e-2 from 179° off, in float32.
+FARTHEST_START = {"cayley": 90.0, "quest": 170.0}
+MOST_ITERATIONS = 8
+# A batch is as large as the sample, but not so small that the time of a call hides that of its work.
+SMALLEST_BATCH, LARGEST_BATCH = 10_000, 100_000
+TIMING_BUDGET_S = 1.0
+
+
+class Candidate(NamedTuple):
+    """A method, or a step and how often, with what was measured of it.
+
+    Attributes:
+        name: The method's, or the step's and the number of iterations.
+        method: A name in `METHODS`, or None for a step.
+        step: A name in `STEPS`, or None for a method.
+        iterations: How many steps, or None for a method.
+        error: The largest error ‖R − R*‖_F on the sample; inf where a result is no number.
+        time_ns: Median time a matrix in ns; NaN where it was not timed, because the error is too large.
+        time_quartiles_ns: The quartiles beside the median; NaN likewise.
+    """
+
+    name: str
+    method: str | None
+    step: str | None
+    iterations: int | None
+    error: float
+    time_ns: float = np.nan
+    time_quartiles_ns: tuple[float, float] = (np.nan, np.nan)
+
+
+class Measured(NamedTuple):
+    """A candidate and its program for the sample's batch."""
+
+    candidate: Candidate
+    compiled: Compiled
+
+
+class Apply(functools.partial):
+    """A function with its options, shown as the call it makes."""
+
+    def __repr__(self) -> str:
+        options = ", ".join(f"{name}={value!r}" for name, value in self.keywords.items())
+        return f"<{self.func.__name__}(..., {options})>"
+
+
+def apply_of(candidate: Candidate, *, takes_previous: bool) -> Apply:
+    """The function to call: of a matrix, or of a matrix and the previous rotation."""
+    if candidate.method is None:
+        return Apply(refine_rotation, step=candidate.step, iterations=candidate.iterations)
+    return Apply(nearest_rotation_from_cold if takes_previous else nearest_rotation, method=candidate.method)
+
+
+def nearest_rotation_from_cold(matrix: ArrayLike, rotation: ArrayLike, *, method: str) -> jax.Array:
+    """`nearest_rotation` with the arguments and the result's shape of `refine_rotation`: the start is not used."""
+    checked = check_matrix(matrix)
+    start = check_start(rotation, "rotation", (3, 3), checked.value).value
+    broadcast = jnp.broadcast_to(checked.value, start.shape)
+    return nearest_rotation(broadcast, method=method).astype(checked.dtype)
+
+
+def outside_domain(method: Method, sample: Sample) -> str | None:
+    """Why a method is not for matrices like these, in words, or None; see `recommend` for the rule."""
+    if not method.handles_inversion and sample.not_upright:
+        return f"for det A > 0, and {sample.not_upright:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
+    size = sample.judged.size
+    if not method.scale_free and (size.max() > domain.UNIT_SCALE or size.min() < 1 / domain.UNIT_SCALE):
+        return f"for matrices of size 1, and sizes are from {number(size.min())} to {number(size.max())}"
+    limit = method.condition_limit[sample.dtype]
+    largest = sample.largest_condition
+    # At a limit this high nothing is left out, matrices without a unique R* included.
+    if limit >= domain.largest_condition(sample.dtype):
+        return None
+    if method.exact and limit == 0:
+        return "exact, but declares no κ up to which its error is a few eps"
+    # To rounding: a rotation is one, κ = 1/2, with the digits that its dtype has.
+    rounding = 1 + 8 * float(np.finfo(sample.dtype).eps)
+    if method.exact and largest > limit * rounding:
+        return f"declared for κ ≤ {number(limit)}, and κ is up to {_larger(largest, limit)}"
+    if not method.exact and largest > APPROXIMATION_LIMIT:
+        most = APPROXIMATION_LIMIT
+        return f"an approximation for κ ≤ {number(most)}, and κ is up to {_larger(largest, most)}"
+    return None
+
+
+def start_outside_domain(step: str, sample: Sample) -> str | None:
+    """Why a step does not get on from these starts, in words, or None."""
+    farthest = FARTHEST_START.get(step)
+    if sample.starts is None or farthest is None:
+        return None
+    angle = _largest_angle(sample.starts, sample.judged)
+    if angle <= farthest:
+        return None
+    return f"from within {farthest:.0f}°, and a start is {angle:.0f}° off"
+
+
+def measure_method(name: str, sample: Sample) -> Measured:
+    """Compiles a method and finds its error on the sample."""
+    return _measure(Candidate(name, name, None, None, np.inf), sample)
+
+
+def measure_step(step: str, sample: Sample, largest_error: float) -> Measured:
+    """Finds the smallest number of iterations whose error is small enough, or the best number up to the most."""
+    once = _measure(_step(step, 1), sample)
+    errors = [once.candidate.error]
+    # One program, applied again and again, finds the number; a program for each number would take a second each.
+    rotation = _run(once.compiled, sample, sample.starts)
+    while errors[-1] > largest_error and len(errors) < MOST_ITERATIONS:
+        rotation = _run(once.compiled, sample, rotation)
+        errors.append(error_on(rotation, sample.judged))
+    iterations = len(errors) if errors[-1] <= largest_error else int(np.argmin(errors)) + 1
+    found = once if iterations == 1 else _measure(_step(step, iterations), sample)
+    # The program for that number rounds in another place: at the edge it may take one iteration more.
+    while found.candidate.error > largest_error >= errors[-1] and iterations < MOST_ITERATIONS:
+        iterations += 1
+        found = _measure(_step(step, iterations), sample)
+    return found
+
+
+def time_candidates(measured: list[Measured], sample: Sample) -> list[Candidate]:
+    """The candidates with their times, measured side by side, the fastest first."""
+    candidates = {entry.candidate.name: entry.candidate for entry in measured}
+    timings = time_methods(
+        {entry.candidate.name: entry.compiled for entry in measured},
+        sample.judged.matrices,
+        batch_size(sample),
+        budget_s=TIMING_BUDGET_S,
+        starts=sample.starts,
+    )
+    return [
+        candidates[entry.method]._replace(
+            time_ns=entry.median_ns, time_quartiles_ns=(entry.quartile_1_ns, entry.quartile_3_ns)
+        )
+        for entry in sorted(timings, key=lambda entry: entry.median_ns)
+    ]
+
+
+def batch_size(sample: Sample) -> int:
+    """Matrices in a call that is timed."""
+    return min(max(sample.finite, SMALLEST_BATCH), LARGEST_BATCH)
+
+
+def undetermined(sample: Sample) -> int:
+    """Matrices of the sample whose error is not defined."""
+    judged = sample.judged
+    return int(np.sum(~judged.is_normal | (judged.condition >= domain.largest_condition(sample.dtype))))
+
+
+def error_on(rotation: np.ndarray, judged: Judged) -> float:
+    """The largest error ‖R − R*‖_F.
+
+    Where R* is not determined, κ ≥ 1/(8 eps), an R that is no rotation counts with ‖RᵀR − 1‖_F, and one that loses
+    trace with the smallest error that loses as much: lost trace ≤ s1 ‖R − R*‖²/2. What rounding explains counts 0.
+    """
+    errors = measure_errors(rotation, judged)
+    eps = float(np.finfo(judged.matrices.dtype).eps)
+    lost = np.where(errors.lost_trace > domain.LOST_TRACE_BOUND, errors.lost_trace * eps, 0)
+    defect = np.where(errors.orthogonality > domain.ORTHOGONALITY_BOUND, errors.orthogonality * eps, 0)
+    otherwise = np.maximum(defect, np.sqrt(2 * lost))
+    return float(np.where(np.isnan(errors.forward), otherwise, errors.forward).max())
+
+
+def _step(step: str, iterations: int) -> Candidate:
+    name = f"{step}, {iterations} iteration{'' if iterations == 1 else 's'}"
+    return Candidate(name, None, step, iterations, np.inf)
+
+
+def _measure(candidate: Candidate, sample: Sample) -> Measured:
+    function: Callable = apply_of(candidate, takes_previous=sample.starts is not None)
+    arguments = 1 if sample.starts is None else 2
+    compiled = compile_method(function, batch_size(sample), sample.dtype, arguments=arguments)
+    rotation = _run(compiled, sample, sample.starts)
+    return Measured(candidate._replace(error=error_on(rotation, sample.judged)), compiled)
+
+
+def _run(compiled: Compiled, sample: Sample, starts: np.ndarray | None) -> np.ndarray:
+    arrays = () if starts is None else (starts,)
+    return run_in_chunks(compiled.call, sample.judged.matrices, batch_size(sample), *arrays)
+
+
+def _larger(value: float, limit: float) -> str:
+    """A value with enough digits to be seen to be larger than the limit."""
+    return number(value) if number(value) != number(limit) else f"{value:.8g}"
+
+
+def _largest_angle(starts: np.ndarray, judged: Judged) -> float:
+    """Degrees from a start to R*, at most, where R* is determined."""
+    where = judged.condition < domain.largest_condition(judged.matrices.dtype.name)
+    distance = reference.forward_error(starts, judged.matrices, reference=judged.solution)
+    # ‖R − R*‖_F = 2√2 sin(θ/2); a start that drifted may be longer than that.
+    largest = np.max(distance, where=where, initial=0)
+    return float(np.degrees(2 * np.arcsin(min(1.0, largest / 8**0.5))))

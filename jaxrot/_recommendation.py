@@ -1,0 +1,124 @@
+"""The result of `recommend`, and how it is put in words."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import jax
+
+from jaxrot._candidates import Candidate
+from jaxrot.measuring.words import listed, number
+from jaxrot.solvers import DEFAULT_METHOD
+
+
+class Recommendation(NamedTuple):
+    """What to call, why, and what else there is.
+
+    Every method of `METHODS`, and with `previous` every step of `STEPS`, is in exactly one place: it is recommended, or
+    in `runners_up`, `too_inaccurate` or `excluded`.
+
+    Attributes:
+        name: The method's, or the step's and the number of iterations.
+        method: A name in `METHODS`, or None where a step is recommended.
+        step: A name in `STEPS`, or None where a method is.
+        iterations: How many steps, or None where a method is recommended.
+        apply: The function, for `jit`, `vmap` and `grad`: from matrices (..., 3, 3) to rotations, or, where `previous`
+            was given, from matrices and previous rotations. It computes in the dtype of its matrices.
+        meets: The error is at most tolerance / margin.
+        error: The largest error ‖R − R*‖_F on the sample, R* the nearest rotation in wider arithmetic.
+        time_ns: Median time a matrix in ns, in batches of `batch`.
+        time_quartiles_ns: The quartiles beside the median.
+        tolerance: As given.
+        margin: What the tolerance is divided by.
+        dtype: What was computed in, "float32" or "float64".
+        batch: Matrices in a call that was timed.
+        sample: Matrices whose error was measured.
+        given: Matrices given.
+        not_finite: Of these, matrices left out because they, or their starts, hold a NaN or an infinity.
+        undetermined: Matrices of the sample with κ ≥ 1/(8 eps), or whose R hangs on subnormal entries: R* is not
+            determined there, and they are judged as `recommend` says.
+        runners_up: What else meets the tolerance, the fastest first.
+        too_inaccurate: What does not meet it, the smallest error first; not timed.
+        excluded: What is not for matrices like these, by name, with the reason in words. Steps have the word "steps"
+            behind their name.
+    """
+
+    name: str
+    method: str | None
+    step: str | None
+    iterations: int | None
+    apply: Callable[..., jax.Array]
+    meets: bool
+    error: float
+    time_ns: float
+    time_quartiles_ns: tuple[float, float]
+    tolerance: float
+    margin: float
+    dtype: str
+    batch: int
+    sample: int
+    given: int
+    not_finite: int
+    undetermined: int
+    runners_up: tuple[Candidate, ...]
+    too_inaccurate: tuple[Candidate, ...]
+    excluded: Mapping[str, str]
+
+    @property
+    def statement(self) -> str:
+        """All this in a few sentences."""
+        return " ".join([self._verdict(), *self._beside(), *self._left_out()])
+
+    def _verdict(self) -> str:
+        finite = self.given - self.not_finite
+        count = _matrices(self.sample) if self.sample == finite else f"{self.sample:,} of {_matrices(finite)}"
+        low, high = self.time_quartiles_ns
+        time = f"{number(self.time_ns)} ns a matrix ({number(low)}-{number(high)}) in batches of {self.batch:,}"
+        bound = f"at most 1/{self.margin:g} of it"
+        if self.meets:
+            return (
+                f"{self.name} is the cheapest that meets the tolerance {number(self.tolerance)} on {count} in"
+                f" {self.dtype}: its largest error is {number(self.error)}, {bound}, and it takes {time}."
+            )
+        text = (
+            f"Nothing meets the tolerance {number(self.tolerance)} on {count} in {self.dtype}, with a largest error of"
+            f" {bound}. {self.name} comes nearest: its largest error is {number(self.error)}, and it takes {time}."
+        )
+        return text + (" That is within the tolerance, but without the margin." if self.error <= self.tolerance else "")
+
+    def _beside(self) -> list[str]:
+        sentences = []
+        if faster := [each.name for each in self.runners_up if each.time_ns < self.time_ns]:
+            sentences.append(
+                f"Of candidates as fast within the spread of times it has the smallest error; {listed(faster)} had a"
+                " smaller median."
+            )
+        for each in self.runners_up:
+            if each.name == DEFAULT_METHOD:
+                sentences.append(f"The default, {each.name}, takes {number(each.time_ns)} ns.")
+        return sentences
+
+    def _left_out(self) -> list[str]:
+        sentences = []
+        if self.excluded:
+            sentences.append(
+                f"Not considered, because these matrices are outside their domain: {_some(self.excluded)}."
+            )
+        if self.not_finite:
+            sentences.append(
+                f"{self.not_finite:,} of {_matrices(self.given)} hold a NaN or an infinity and are left out."
+            )
+        if self.undetermined:
+            sentences.append(
+                f"The nearest rotation of {_matrices(self.undetermined)} is not determined: there a rotation counts"
+                " as right that loses no trace tr(RᵀA)."
+            )
+        return sentences
+
+
+def _matrices(count: int) -> str:
+    return f"{count:,} {'matrix' if count == 1 else 'matrices'}"
+
+
+def _some(names: Mapping[str, str]) -> str:
+    shown = list(names)[:4]
+    return listed([*shown, f"{len(names) - 4} more"] if len(names) > 4 else shown)

@@ -1,0 +1,158 @@
+"""What a recommendation is measured on: a sample of the user's matrices, and what all of them are like.
+
+notation: A a matrix; R* its nearest rotation; s1 ≥ s2 ≥ |s3| the signed singular values; κ = s1/(s2+s3).
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import core
+from jax.typing import ArrayLike, DTypeLike
+
+from jaxrot._inputs import check_matrix, check_start
+from jaxrot.measuring import domain
+from jaxrot.measuring.judging import Judged, judge
+
+# More would not tell more, and the reference takes 20 µs a matrix.
+MOST_MATRICES = 10_000
+# Of each kind that a random sample of many could miss: the largest κ, and the smallest s3/s1, negative ones first.
+EXTREMES = 100
+
+# ‖RᵀR − 1‖_F beyond which a start is no rotation that drifted, but something else given by mistake.
+_FARTHEST_FROM_ROTATION = 0.1
+_CHUNK = 100_000
+
+
+class Sample(NamedTuple):
+    """The sample, and what was found out about all matrices.
+
+    Attributes:
+        judged: The sample, in the dtype to compute in, with its reference.
+        starts: The rotations to start from, one a matrix of the sample, or None.
+        given: Matrices given.
+        not_finite: Of these, matrices with a NaN or an infinity, or whose start has one: left out of everything.
+        not_upright: Of the finite ones, matrices with det A < 0, or 0 to rounding.
+        largest_condition: Largest κ of the finite ones; inf where R* is not unique to rounding.
+    """
+
+    judged: Judged
+    starts: np.ndarray | None
+    given: int
+    not_finite: int
+    not_upright: int
+    largest_condition: float
+
+    @property
+    def dtype(self) -> str:
+        """What is computed in: "float32" or "float64"."""
+        return self.judged.matrices.dtype.name
+
+    @property
+    def finite(self) -> int:
+        """Matrices without a NaN or an infinity."""
+        return self.given - self.not_finite
+
+
+def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLike | None) -> Sample:
+    """Admits the arguments of `recommend`, looks at every matrix and draws the sample.
+
+    Raises:
+        ValueError: A shape, a dtype or the contents are not what is expected.
+        TypeError: Arrays that are not real, or traced.
+    """
+    checked = check_matrix(matrices, "matrices").value
+    for name, array in (("matrices", checked), ("previous", previous)):
+        if isinstance(array, core.Tracer):
+            raise TypeError(
+                f"{name} must be concrete, for recommend measures on it; got a traced array:"
+                " call recommend outside jit, vmap and grad, and its apply inside"
+            )
+    checked = checked.astype(_check_dtype(dtype) if dtype is not None else checked.dtype)
+    starts = None
+    if previous is not None:
+        starts = check_start(previous, "previous", (3, 3), checked).value
+        checked = jnp.broadcast_to(checked, starts.shape)
+    if checked.size == 0:
+        raise ValueError(f"matrices must hold at least one matrix; got shape {checked.shape}")
+    a = np.asarray(checked).reshape(-1, 3, 3)
+    is_finite = np.isfinite(a).all(axis=(1, 2))
+    if starts is not None:
+        starts = np.asarray(starts).reshape(-1, 3, 3)
+        _check_rotations(starts)
+        is_finite &= np.isfinite(starts).all(axis=(1, 2))
+        starts = starts[is_finite]
+    if not is_finite.any():
+        raise ValueError(
+            f"matrices must hold at least one without a NaN or an infinity; got {len(a):,} with one in {a.dtype}"
+        )
+    given, a = len(a), a[is_finite]
+    condition, relative_s3 = _survey(a)
+    kept = _draw(condition, relative_s3, a.dtype)
+    return Sample(
+        judged=judge({"sample": a[kept]}, a.dtype.name),
+        starts=None if starts is None else starts[kept],
+        given=given,
+        not_finite=given - len(a),
+        # The sign of a determinant below that is rounding, and with it what a method for det A > 0 returns.
+        not_upright=int(np.sum(relative_s3 <= 8 * float(np.finfo(a.dtype).eps))),
+        largest_condition=float(condition.max()),
+    )
+
+
+def _check_dtype(dtype: DTypeLike) -> np.dtype:
+    try:
+        wanted = np.dtype(dtype)
+    except TypeError:
+        raise TypeError(f"dtype must be float32 or float64; got {dtype!r}") from None
+    if wanted.name not in ("float32", "float64"):
+        raise ValueError(f"dtype must be float32 or float64; got {wanted.name}")
+    if wanted.name == "float64" and not jnp.asarray(0.0).dtype == wanted:
+        raise ValueError(
+            "dtype float64 needs jax.config.update('jax_enable_x64', True) at the start of the program; it is off"
+        )
+    return wanted
+
+
+def _check_rotations(starts: np.ndarray) -> None:
+    r = starts.astype(np.float64)
+    with np.errstate(all="ignore"):
+        defect = np.linalg.norm(np.swapaxes(r, 1, 2) @ r - np.eye(3), axis=(1, 2))
+        is_rotation = (defect <= _FARTHEST_FROM_ROTATION) & (np.linalg.det(r) > 0)
+    wrong = int(np.sum(~is_rotation & np.isfinite(r).all(axis=(1, 2))))
+    if wrong:
+        raise ValueError(
+            f"previous must hold rotations, ‖RᵀR - 1‖_F ≤ {_FARTHEST_FROM_ROTATION} and det R > 0;"
+            f" got {wrong:,} of {len(r):,} that are none"
+        )
+
+
+def _survey(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """κ and s3/s1 of every matrix, in float64: to the rounding of that, not of the reference."""
+    parts = [_survey_chunk(matrices[begin : begin + _CHUNK]) for begin in range(0, len(matrices), _CHUNK)]
+    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+
+
+def _survey_chunk(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a = matrices.astype(np.float64)
+    # A power of two, which is exact: the determinant must neither overflow nor vanish.
+    _, exponent = np.frexp(np.abs(a).max(axis=(1, 2)))
+    a = np.ldexp(a, -exponent[:, None, None])
+    s = np.linalg.svd(a, compute_uv=False)
+    s = s / np.where(s[:, :1] == 0, 1, s[:, :1])
+    s3 = s[:, 2] * np.sign(np.linalg.det(a))
+    gap = s[:, 1] + s3
+    unresolved = gap <= 8 * float(np.finfo(np.float64).eps)
+    return np.where(unresolved, np.inf, 1 / np.where(unresolved, 1, gap)), s3
+
+
+def _draw(condition: np.ndarray, relative_s3: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """Indices of the sample: the extremes and a random rest."""
+    if len(condition) <= MOST_MATRICES:
+        return np.arange(len(condition))
+    # Where R* is not determined no error is judged: the largest κ below that.
+    judged_condition = np.where(condition < domain.largest_condition(dtype.name), condition, 0)
+    extremes = np.union1d(np.argsort(-judged_condition)[:EXTREMES], np.argsort(relative_s3)[:EXTREMES])
+    others = np.setdiff1d(np.arange(len(condition)), extremes)
+    drawn = np.random.default_rng(0).choice(others, MOST_MATRICES - len(extremes), replace=False)
+    return np.sort(np.concatenate([extremes, drawn]))
