@@ -1,0 +1,142 @@
+"""The README's measured regions: written from a report, and nothing else touched."""
+
+import json
+import pathlib
+import re
+
+import pytest
+
+from jaxrot import DEFAULT_METHOD, METHODS
+from jaxrot.report import readme
+
+ROOT = pathlib.Path(__file__).parent.parent.parent
+ENVIRONMENT = {
+    "date": "2026-01-02 03:04:05+00:00",
+    "device": "cpu: Some processor",
+    "threads": "2 cores usable",
+    "jax, jaxlib, numpy": "0.10.1, 0.10.1, 2.4.6",
+}
+
+
+def accuracy(method, dtype):
+    return {
+        "method": method, "dtype": dtype, "set_name": "whole input", "matrices": 6000, "outside": 7,
+        "forward_median": 1e-7, "forward_99th": "inf",
+    }  # fmt: skip
+
+
+def timing(method, dtype):
+    median = 10 + list(METHODS).index(method)
+    return {
+        "method": method, "dtype": dtype, "batch": 1000, "median_ns": median, "quartile_1_ns": 9.0, "quartile_3_ns": 99.0,
+    }  # fmt: skip
+
+
+def contender(name, dtype="float32", *, gradient=True):
+    error = {"median": 1e-7, "percentile_99": 2e-7, "largest": "inf"}
+    time = {"median": 123.0, "quartile_1": 100.0, "quartile_3": 200.0}
+    return {
+        "name": name, "is_own": name == DEFAULT_METHOD, "dtype": dtype, "threads": 2, "error": error, "outside": 3,
+        "time": time, "gradient_error": error if gradient else None, "families_no_number": ["zero"],
+        "gradient_time": time if gradient else None,
+    }  # fmt: skip
+
+
+def price(guard, dtype):
+    is_apart = guard == "inversion"
+    return {
+        "of": DEFAULT_METHOD, "guard": guard, "dtype": dtype, "judged": 100,
+        "time": {"nanoseconds": 40.0, "nanoseconds_with": 50.0, "ratio": 0.8, "quartile_1": 0.7,
+                 "quartile_3": 0.9 if is_apart else 1.1},
+        "broken": [{"family": "minus_identity", "matrices": 5, "not_finite": 0, "worst": "inf", "promise": "torque"}]
+        if is_apart else [],
+        "gained": 0,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def report():
+    pairs = [(method, dtype) for method in METHODS for dtype in ("float32", "float64")]
+    contenders = [contender(DEFAULT_METHOD), contender("Peer"), contender("Plain", gradient=False), contender("Wide", "float64")]
+    return {
+        "environment": ENVIRONMENT,
+        "accuracy": [accuracy(*pair) for pair in pairs],
+        "timing": [timing(*pair) for pair in pairs],
+        "findings": ["First.", "Peers: none beyond.", "Third."],
+        "peers": {"contenders": contenders, "skipped": []},
+        "guards": {"default": [price(g, d) for g in ("", "inversion", "polish") for d in ("float32", "float64")]},
+    }
+
+
+@pytest.fixture
+def bench():
+    goal = {"median": 30.0, "quartile_1": 20.0, "quartile_3": 40.0, "batch": 100_000, "at_least": True}
+    goals = [
+        goal | {"what": "svd over default", "bound": 25.0, "is_met": True},
+        goal | {"what": "svd over one newton step", "bound": 100.0, "is_met": False},
+    ]
+    return {"environment": ENVIRONMENT, "goals": goals}
+
+
+def test_every_region_is_filled_and_the_rest_is_left(report, bench):
+    text = "before\n" + "".join(f"<!-- measured: {name} -->\nold\n<!-- /measured -->\nkept\n" for name in readme.REGIONS)
+    filled = readme.filled(text, report, bench)
+    assert "old" not in filled
+    assert filled.startswith("before\n")
+    assert filled.count("kept\n") == len(readme.REGIONS)
+    assert readme.filled(filled, report, bench) == filled
+
+
+def test_methods_stand_in_the_order_of_their_times(report, bench):
+    region = readme.methods_region(report, bench)
+    assert re.findall(r"^\| `(\w+)`", region, re.MULTILINE) == list(METHODS)
+    assert f"| `{DEFAULT_METHOD}` (default) |" in region
+    assert "1.0e-7 / ∞ | 7 / 7 | 10 / 10 |" in region
+    assert "Measured on 2026-01-02" in region
+    assert "Some processor, 2 cores, jax 0.10.1, batches of 1,000" in region
+
+
+def test_peers_are_those_of_float32(report, bench):
+    region = readme.peers_region(report, bench)
+    assert "Peers: none beyond." in region
+    assert f"| **{DEFAULT_METHOD}** |" in region
+    assert "| Plain | 2 | 1.0e-7 / 2.0e-7 | 3 | 123 | - | - | - |" in region
+    assert "Wide" not in region
+
+
+def test_a_missed_goal_is_marked(report, bench):
+    region = readme.speed_region(report, bench)
+    assert "| `svd` over default | 100,000 | 30 (20-40) | ≥ 25 |" in region
+    assert "| `svd` over one `newton` step | 100,000 | 30 (20-40) | ≥ 100, missed |" in region
+
+
+def test_a_guard_costs_something_only_beyond_the_spread(report, bench):
+    region = readme.guards_region(report, bench)
+    assert "| inversion | 0.8 (0.7-0.9) / 0.8 (0.7-0.9) | 5 / 5 | `minus_identity` |" in region
+    assert "| polish | within the spread (0.7-1.1) / within the spread (0.7-1.1) | 0 / 0 | none |" in region
+
+
+def test_an_unknown_region_is_no_region(report, bench):
+    with pytest.raises(KeyError, match="other"):
+        readme.filled("<!-- measured: other -->\n<!-- /measured -->", report, bench)
+
+
+def test_the_command_writes_the_readme_and_its_pictures(report, bench, tmp_path):
+    folder, pictures = tmp_path / "report", tmp_path / "pictures"
+    folder.mkdir()
+    pictures.mkdir()
+    (folder / "report.json").write_text(json.dumps(report))
+    (folder / "bench.json").write_text(json.dumps(bench))
+    for name in readme.PICTURES:
+        (folder / name).write_bytes(name.encode())
+    (tmp_path / "README.md").write_text("<!-- measured: speed -->\n<!-- /measured -->\n")
+    readme.main([str(folder), "--readme", str(tmp_path / "README.md"), "--pictures", str(pictures)])
+    assert "svd" in (tmp_path / "README.md").read_text()
+    assert {path.name for path in pictures.iterdir()} == set(readme.PICTURES)
+
+
+def test_the_readme_of_this_project_has_every_region_filled():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    regions = re.findall(r"<!-- measured: (\w+) -->\n(.*?)<!-- /measured -->", text, re.DOTALL)
+    assert {name for name, _ in regions} == set(readme.REGIONS)
+    assert all("| :---" in content for _, content in regions)
