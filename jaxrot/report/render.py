@@ -20,7 +20,6 @@ from jaxrot.report.tables import (
     as_text,
     goals_table,
     sets_table,
-    stages_table,
     summary_table,
     timing_table,
 )
@@ -40,7 +39,7 @@ timed in every dtype, without a cache."""
 _BENCH = """\
 Gaussian matrices, float32 where not said otherwise. Ratios of times are medians and quartiles over rounds in which
 every function of a group runs once, in random order; compiled and warmed up beforehand, each call waited for. The copy
-is `A * c`, into a new array. *In blocks*: `in_blocks`. Outside the contract: matrices of all families."""
+is `A * c`, into a new array. *In blocks*: `in_blocks`."""
 
 _VERDICTS = """\
 Matrices outside the contract: `·` none, **bold** inside the method's own domain (a broken promise), (in parentheses)
@@ -116,17 +115,15 @@ def as_csv(results: Results) -> str:
 
 
 def as_bench_markdown(bench: Bench, environment: Mapping[str, str]) -> str:
-    """bench.md: header and the two tables."""
-    parts = ["# Speed of jaxrot", _header(environment), _BENCH]
-    for table in (goals_table(bench.goals), stages_table(bench.stages)):
-        parts += [f"## {table.title}", as_markdown(table)]
+    """bench.md: header and table."""
+    table = goals_table(bench.goals)
+    parts = ["# Speed of jaxrot", _header(environment), _BENCH, f"## {table.title}", as_markdown(table)]
     return "\n\n".join(parts) + "\n"
 
 
 def as_bench_text(bench: Bench, environment: Mapping[str, str]) -> str:
     """What the command prints."""
-    tables = (goals_table(bench.goals), stages_table(bench.stages))
-    return "\n\n".join([_columns(environment), *map(as_text, tables)])
+    return "\n\n".join([_columns(environment), as_text(goals_table(bench.goals))])
 
 
 def as_bench_json(bench: Bench, environment: Mapping[str, str]) -> str:
@@ -134,7 +131,6 @@ def as_bench_json(bench: Bench, environment: Mapping[str, str]) -> str:
     content = {
         "environment": dict(environment),
         "goals": [goal._asdict() | {"is_met": goal.is_met} for goal in bench.goals],
-        "stages": [stage._asdict() for stage in bench.stages],
         "nanoseconds": bench.nanoseconds,
     }
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
