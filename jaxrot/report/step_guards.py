@@ -68,8 +68,9 @@ def one_step(step: str, without: tuple[str, ...] = ()) -> Callable[[jax.Array, j
 
 def _torque(b: Mat3, without: tuple[str, ...]) -> Quaternion:
     epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(_mat3.squared_norm(b))
+    one = jnp.ones_like(epsilon)
     size = _mat3.trace(b) if "absolute value" in without else jnp.abs(_mat3.trace(b))
-    inverse = safe_divide(jnp.ones_like(epsilon), size if "epsilon" in without else size + epsilon)
+    inverse = safe_divide(one, size if "epsilon" in without else size + epsilon)
     return _quaternion.exponential(_mat3.scale_vector(_mat3.axial(b), inverse))
 
 

@@ -56,7 +56,7 @@ def test_the_default_with_nothing_left_out_breaks_nothing(default):
 def test_without_inversion_the_inverted_families_break_and_no_other(default):
     price = default["inversion"]
     assert {"minus_rotation_1e-1", "near_tie", "equal_large"} <= names(price)
-    assert not {"rotation", "rank_one", "scaled_rotation", NOT_FINITE} & names(price)
+    assert not {"rotation", "scaled_rotation", "noisy_rotation_0.1", NOT_FINITE} & names(price)
     worst = {entry.family: entry.worst for entry in price.broken}
     # Half a turn off: 2√2, of a bound of 8 eps (1+κ) with κ near 5.
     assert 1e4 < worst["minus_rotation_1e-1"] < 3e6
@@ -72,7 +72,9 @@ def test_without_renormalisation_the_default_breaks_nothing_and_the_table_says_s
 
 
 def test_a_ratio_is_that_of_the_times_it_names(default, step):
-    assert default["inversion"].time == Time(pytest.approx(3e9 / 138), pytest.approx(4e9 / 138), 0.75, 0.75, 0.75)
+    # As many are timed as are judged, where those are more than the batch.
+    matrices = default["inversion"].judged
+    assert default["inversion"].time == Time(3 / matrices * 1e9, 4 / matrices * 1e9, 0.75, 0.75, 0.75)
     # Escape is off by default: what is left out is the default program, what it is compared with has it.
     assert step["escape"].time.ratio == 0.5
     assert step[""].time.ratio == step["renormalisation"].time.ratio == 1
@@ -92,7 +94,7 @@ def test_programs_are_timed_side_by_side_for_the_fewest_rounds_at_least():
 
 
 def test_without_escape_the_half_turn_starts_break(step):
-    assert {"identity", "rotation", "half_turn", "scaled_rotation"} <= names(step["escape"])
+    assert {"identity", "half_turn", "swap"} <= names(step["escape"])
     assert not {"zero", NOT_FINITE} & names(step["escape"])
     assert step["escape"].judged * 3 == step[""].judged
 
@@ -153,7 +155,7 @@ def test_a_step_that_does_nothing_keeps_the_nearest_start_and_one_that_turns_doe
 
     def turned(matrix, q):
         """To the start's negative first component: another rotation altogether."""
-        return q * jnp.array([-1.0, 1, 1, 1])
+        return q * jnp.array([[-1.0, 1, 1, 1]])
 
     moved = judge_step(turned, lambda m, q: q, 3, posed, 20)
     is_rank_one = np.arange(16) < 8
