@@ -18,8 +18,8 @@ from jaxrot.report.step_starts import HALF_TURN, ITERATIONS, Posed, judge_step, 
 from jaxrot.report.verdict import Broken, Verdict, broken_families, judge_contract, sample_families
 from jaxrot.solvers import half_turn
 
-# Three in four of that many rounds agree by chance once in twenty times, of the 31 that are usual hardly ever.
-_FEWEST_ROUNDS = 12
+# Of equal times three in four of that many rounds agree by chance once in 80 times, of 12 rounds once in 7.
+_FEWEST_ROUNDS = 20
 _SHORTEST_SAMPLE_S = 5e-3
 
 
