@@ -113,6 +113,7 @@ def test_every_stage_is_needed(guard):
     batch = family_batch("float64")
     families = {
         "scale": ["scale_large", "scale_huge"],
+        "largest component": ["half_turn", "near_half_turn"],
         "inversion": ["minus_rotation_1e-1", "reflection"],
         "weakest axis": ["needle", "ill_conditioned"],
         "polish": ["needle", "ill_conditioned", "minus_rotation_1e-2"],

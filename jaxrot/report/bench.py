@@ -1,4 +1,4 @@
-"""`report --bench`: the library's own speed goals, as ratios measured side by side, and what each stage costs."""
+"""`report --bench`: the library's own speed goals, as ratios measured side by side."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -8,11 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxrot
-from jaxrot.families import FAMILIES
-from jaxrot.measuring.accuracy import measure_errors
-from jaxrot.measuring.judging import judge
 from jaxrot.measuring.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
-from jaxrot.solvers import half_turn
 
 
 class Size(NamedTuple):
@@ -22,7 +18,6 @@ class Size(NamedTuple):
     middle: int = 100_000
     large: int = 1_000_000
     growth: tuple[int, ...] = (10_000, 100_000, 1_000_000, 10_000_000)
-    matrices_a_family: int = 500
     budget_s: float = 12.0
 
 
@@ -53,37 +48,20 @@ class Goal(NamedTuple):
         return self.median >= self.bound if self.at_least else self.median <= self.bound
 
 
-class Stage(NamedTuple):
-    """What leaving one stage of the default method out saves and breaks.
-
-    Attributes:
-        name: The stage, "" for none.
-        nanoseconds: Median a matrix, by dtype.
-        broken: Families with a matrix outside the contract, by dtype.
-        outside: Matrices outside it, by dtype.
-    """
-
-    name: str
-    nanoseconds: Mapping[str, float]
-    broken: Mapping[str, tuple[str, ...]]
-    outside: Mapping[str, int]
-
-
 class Bench(NamedTuple):
     """Everything that `--bench` measures; `nanoseconds` are medians a matrix by function and batch."""
 
     goals: list[Goal]
-    stages: list[Stage]
     nanoseconds: dict[str, float]
 
 
-GROUPS = ("at 1e5", "at 1e6", "growth", "small", "compile times", "stages")
+GROUPS = ("at 1e5", "at 1e6", "growth", "small", "compile times")
 
 
 def run_bench(size: Size, advance: Callable[[str], object]) -> Bench:
     """Measures all groups, inside `measuring_configuration`; `advance` is called before each."""
-    bench = Bench([], [], {})
-    for name, group in zip(GROUPS, (_middle, _large, _growth, _small, _compile_times, _stages), strict=True):
+    bench = Bench([], {})
+    for name, group in zip(GROUPS, (_middle, _large, _growth, _small, _compile_times), strict=True):
         advance(f"bench: {name}")
         group(bench, size)
     return bench
@@ -206,27 +184,3 @@ def _compile_times(bench: Bench, size: Size) -> None:
     slowest = max(seconds, key=lambda name: seconds[name])
     for name in dict.fromkeys((jaxrot.DEFAULT_METHOD, slowest)):
         _add(bench, f"seconds to compile {name}", size.middle + 1, np.array(seconds[name]), 1.5)
-
-
-def _stages(bench: Bench, size: Size) -> None:
-    nanoseconds: dict[str, dict[str, float]] = {name: {} for name in ("", *half_turn.GUARDS)}
-    outside: dict[str, dict[str, int]] = {name: {} for name in nanoseconds}
-    broken: dict[str, dict[str, tuple[str, ...]]] = {name: {} for name in nanoseconds}
-
-    def solver(name: str) -> Callable[[jax.Array], jax.Array]:
-        return lambda matrix: half_turn.solve(matrix, without=(name,) if name else ())
-
-    for dtype in ("float32", "float64"):
-        a = _gaussian(size.middle, dtype)
-        samples = _time(bench, {name: (solver(name), (a,)) for name in nanoseconds}, size)
-        sets = {
-            name: family.sample(size.matrices_a_family, dtype=np.dtype(dtype), seed=0).matrices
-            for name, family in FAMILIES.items()
-        }
-        judged = judge(sets, dtype)
-        for name in nanoseconds:
-            nanoseconds[name][dtype] = float(np.median(samples[name])) / size.middle * 1e9
-            wrong = measure_errors(np.asarray(jax.jit(solver(name))(judged.matrices)), judged).is_outside
-            outside[name][dtype] = int(wrong.sum())
-            broken[name][dtype] = tuple(family for family, part in judged.sets.items() if wrong[part].any())
-    bench.stages.extend(Stage(name, nanoseconds[name], broken[name], outside[name]) for name in nanoseconds)

@@ -11,7 +11,7 @@ from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.progress import progress
-from jaxrot.report import bench, bench_document, document, records, stability
+from jaxrot.report import bench, bench_document, document, guards, records, stability
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import dragon_input, read_input, thinned
@@ -39,7 +39,7 @@ class _Size(NamedTuple):
 
 
 _FULL = _Size("both", (100, 10_000, 100_000), 1_000_000, 400, 200_000, 200, 70.0, 40.0, 16.0)
-_QUICK_BENCH = bench.Size(100, 10_000, 100_000, (10_000, 100_000), 20, 1.0)
+_QUICK_BENCH = bench.Size(100, 10_000, 100_000, (10_000, 100_000), 1.0)
 _QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0, 4.0, 2.0)
 
 
@@ -56,9 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--peers", action="store_true", help="beside other packages, as far as they are installed (extra: peers)"
     )
     parser.add_argument("--compare", type=Path, metavar="OLD.json", help="the report.json of an earlier run")
-    parser.add_argument(
-        "--bench", action="store_true", help="instead: the library's own speed goals, and what each stage costs"
-    )
+    parser.add_argument("--bench", action="store_true", help="instead: the library's own speed goals")
     parser.add_argument("--quick", action="store_true", help="under 20 seconds: one dtype, one batch size, less of all")
 
 
@@ -87,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
         peers_budget_s=size.peers_budget_s if options.peers else None,
         warm_starts_budget_s=size.warm_starts_budget_s if is_everything else None,
         map_steps=None if options.quick else stability.STEPS,
+        guards_size=guards.Size() if is_everything else None,
     )
     before = options.compare and read_report(options.compare)
     check_installed(["markdown", "matplotlib"], "report")

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from jaxrot.report.comparison import Comparison
 from jaxrot.report.contenders import Beside
+from jaxrot.report.guards import Guards
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import Results
 from jaxrot.report.stability import ConditionMap, ScaleMap
@@ -24,6 +25,7 @@ class Content(NamedTuple):
         warm_starts: Every step.
         conditions: Stability over the singular values, one map a dtype.
         scales: Stability over the scale, likewise.
+        guards: What each guard costs and prevents.
         comparison: With an earlier report.
     """
 
@@ -36,4 +38,5 @@ class Content(NamedTuple):
     warm_starts: tuple[WarmStart, ...] = ()
     conditions: tuple[ConditionMap, ...] = ()
     scales: tuple[ScaleMap, ...] = ()
+    guards: Guards | None = None
     comparison: Comparison | None = None

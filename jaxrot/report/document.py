@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+import jaxrot
 from jaxrot.report import pictures as picture_names
 from jaxrot.report.beside_tables import (
     compared_sentence,
@@ -14,6 +15,7 @@ from jaxrot.report.beside_tables import (
 )
 from jaxrot.report.content import Content
 from jaxrot.report.findings import faster_outside, findings, on_input
+from jaxrot.report.guard_tables import GUARDS_CAPTION, guards_table
 from jaxrot.report.maps import CONDITIONS_CAPTION, SCALES_CAPTION
 from jaxrot.report.survivors import SURVIVORS_CAPTION, survivors_table
 from jaxrot.report.tables import Table, accuracy_table, as_markdown, as_text, sets_table, summary_table, timing_table
@@ -88,6 +90,10 @@ def as_report_markdown(content: Content, pictures: Mapping[str, bytes]) -> str:
         parts += ["## Warm starts", _WARM_STARTS]
         for dtype in content.dtypes:
             parts += _section(warm_starts_table(content.warm_starts, dtype))
+    if content.guards is not None:
+        parts += ["## The price of every guard", GUARDS_CAPTION]
+        parts += _section(guards_table(content.guards.default, f"The default method, {jaxrot.DEFAULT_METHOD}"))
+        parts += _section(guards_table(content.guards.steps, "The steps"))
     if content.comparison is not None:
         parts += ["## Against an earlier run", compared_sentence(content.comparison), _COMPARED]
         parts += content.comparison.remarks

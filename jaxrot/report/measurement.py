@@ -12,6 +12,7 @@ from jaxrot.measuring import reference
 from jaxrot.measuring.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
 from jaxrot.measuring.judging import Judged
 from jaxrot.measuring.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
+from jaxrot.report.guards import Size as GuardsSize
 
 WHOLE = "whole input"
 
@@ -29,6 +30,7 @@ class Plan(NamedTuple):
         peers_budget_s: Seconds for the rounds with peers in both dtypes; None leaves peers out.
         warm_starts_budget_s: Seconds for the rounds of warm starts in both dtypes; None leaves them out.
         map_steps: Steps of the stability maps along s2/s1, a power of two; None leaves them out.
+        guards_size: How much to measure of the guards, in the plan's dtypes; None leaves them out.
     """
 
     methods: tuple[str, ...]
@@ -40,6 +42,7 @@ class Plan(NamedTuple):
     peers_budget_s: float | None = None
     warm_starts_budget_s: float | None = None
     map_steps: int | None = None
+    guards_size: GuardsSize | None = None
 
 
 class Results(NamedTuple):

@@ -30,6 +30,7 @@ def as_json(content: Content) -> str:
             "timing": content.results.timing,
             "peers": None if beside is None else beside,
             "warm_starts": content.warm_starts,
+            "guards": content.guards,
             "stability": {
                 "conditions": {found.dtype: summarise_conditions(found) for found in content.conditions},
                 "scales": {found.dtype: summarise_scales(found) for found in content.scales},
@@ -65,7 +66,6 @@ def as_bench_json(bench: Bench, environment: Mapping[str, str]) -> str:
         {
             "environment": environment,
             "goals": [goal._asdict() | {"is_met": goal.is_met} for goal in bench.goals],
-            "stages": bench.stages,
             "nanoseconds": bench.nanoseconds,
         }
     )

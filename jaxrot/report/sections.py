@@ -7,8 +7,9 @@ import numpy as np
 
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
-from jaxrot.report import beside, warm_starts
+from jaxrot.report import beside, guards, warm_starts
 from jaxrot.report.contenders import Beside
+from jaxrot.report.guards import Guards
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Plan, Results, measure_methods
 from jaxrot.report.measurement import number_of_steps as steps_of_methods
@@ -26,6 +27,7 @@ class Measured(NamedTuple):
     warm_starts: tuple[WarmStart, ...]
     conditions: tuple[ConditionMap, ...] = ()
     scales: tuple[ScaleMap, ...] = ()
+    guards: Guards | None = None
 
 
 def number_of_steps(plan: Plan) -> int:
@@ -35,7 +37,8 @@ def number_of_steps(plan: Plan) -> int:
         steps += beside.number_of_steps(plan.methods)
     if plan.warm_starts_budget_s is not None:
         steps += warm_starts.number_of_steps(with_peers=plan.peers_budget_s is not None)
-    return len(plan.dtypes) * (steps + (plan.map_steps is not None))
+    steps += plan.map_steps is not None
+    return len(plan.dtypes) * steps + (0 if plan.guards_size is None else guards.number_of_steps(_guards_size(plan)))
 
 
 def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measured:
@@ -78,7 +81,13 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
                 advance=advance,
             )
     peers = None if plan.peers_budget_s is None else Beside(contenders, list(skipped))
-    return Measured(results, peers, tuple(starts), tuple(conditions), tuple(scales))
+    prices = None if plan.guards_size is None else guards.run_guards(_guards_size(plan), advance)
+    return Measured(results, peers, tuple(starts), tuple(conditions), tuple(scales), prices)
+
+
+def _guards_size(plan: Plan) -> guards.Size:
+    assert plan.guards_size is not None
+    return plan.guards_size._replace(dtypes=plan.dtypes)
 
 
 def _families(count: int, dtype: str) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.domain import describe_domain
 from jaxrot.measuring.timing import Timing
 from jaxrot.measuring.words import number
-from jaxrot.report.bench import Goal, Stage
+from jaxrot.report.bench import Goal
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.measurement import WHOLE, Results
 
@@ -156,20 +156,3 @@ def goals_table(goals: list[Goal]) -> Table:
         for goal in goals
     ]
     return Table("Speed", ["what", "batch", "median", "quartiles", "goal", "met"], rows)
-
-
-def stages_table(stages: list[Stage]) -> Table:
-    """The stages as a table of words."""
-    rows = []
-    for stage in stages:
-        broken = sorted(set().union(*stage.broken.values()))
-        rows.append(
-            [
-                stage.name or "nothing",
-                " / ".join(number(value) for value in stage.nanoseconds.values()),
-                " / ".join(f"{value:,}" for value in stage.outside.values()),
-                ", ".join(broken[:6]) + (f" and {len(broken) - 6} more" if len(broken) > 6 else "") or "none",
-            ]
-        )
-    header = ["left out", "ns a matrix, float32 / float64", "outside the contract", "families that break"]
-    return Table("What the stages of the default method cost", header, rows)

@@ -11,7 +11,7 @@ from jaxrot._scaling import safe_divide, scaled
 from jaxrot.steps.exact_angle import turn_about
 
 # The stages that keep a promise each and that `solve` can leave out, to see what they cost.
-GUARDS = ("scale", "inversion", "weakest axis", "polish", "renormalisation")
+GUARDS = ("scale", "largest component", "inversion", "weakest axis", "polish", "renormalisation")
 
 _NEWTON_STEPS = {"float32": 3, "float64": 4}
 
@@ -35,7 +35,8 @@ def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
 
     1. f = |s1|+|s2|+|s3|, from a fixed point that keeps its digits, and σ = sign det A.
     2. The quaternion of R(σA), the null vector of f·1 − N(σA), N Davenport's matrix. All singular values of σA are
-       positive: at most one gap is small, and the null vector is wrong about that one axis only.
+       positive: at most one gap is small, and the null vector is wrong about that one axis only. *largest component*:
+       it is solved for with its largest component 1, not with the first one, which is 0 at a half turn.
     3. *inversion*: where σ = −1, R(A) is R(σA) after half a turn about the weakest axis of the stretch.
     4. *weakest axis*: the best angle about the axis of the smallest gap. It is the best of a whole circle, so that
        it makes good what 2 and 3 left open there, the sign of a determinant that is rounding included.
@@ -58,7 +59,7 @@ def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
     if "scale" not in without:
         a = scaled(a)
     f = signed_sum(a)
-    q = nearest_to_definite(a, f)
+    q = nearest_to_definite(a, f, is_chosen="largest component" not in without)
     if "inversion" not in without:
         q = half_turn(a, q, f)
     if "weakest axis" not in without:
@@ -96,12 +97,18 @@ def signed_sum(a: Mat3) -> jax.Array:
     return f
 
 
-def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
+def nearest_to_definite(a: Mat3, f: jax.Array, *, is_chosen: bool = True) -> Quaternion:
     """The quaternion of R(σA), any length but 0: the null vector of f·1 − N(σA).
 
     A half turn in front makes its largest component the first one; the other three then solve a definite system. Which
     one that is, the largest diagonal entry of the adjugate tells; shifted by what rounding does to f, so that it
     means something where two eigenvalues of N are equal.
+
+    Args:
+        a: The matrices, their scale removed.
+        f: `signed_sum(a)`.
+        is_chosen: Whether there is a half turn in front, static. Without it the system is singular where R is a half
+            turn, and the first component, 1 here, is none of the quaternion's.
     """
     size, sign = jnp.abs(f), jnp.where(f < 0, -jnp.ones_like(f), jnp.ones_like(f))
     eps, tiny = float(jnp.finfo(f.dtype).eps), float(jnp.finfo(f.dtype).tiny)
@@ -112,7 +119,11 @@ def nearest_to_definite(a: Mat3, f: jax.Array) -> Quaternion:
         + 2 * shifted * cofactor[i][i]
         for i in range(3)
     )
-    k = computed_once(index_of_largest((x + y + z, x - y - z, y - x - z, z - x - y)))
+    k = (
+        computed_once(index_of_largest((x + y + z, x - y - z, y - x - z, z - x - y)))
+        if is_chosen
+        else jnp.zeros_like(f)
+    )
 
     one = jnp.ones_like(f)
     flips = (choose(k, one, one, -one, -one), choose(k, one, -one, one, -one))

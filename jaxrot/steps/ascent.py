@@ -9,8 +9,11 @@ from jaxrot._choice import exchange, is_positive
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_sqrt
 
+# What `ascent` can leave out, to see what it costs.
+GUARDS = ("absolute pivots", "free axes")
 
-def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
+
+def ascent(h: Mat3, b: Mat3, v: Vec3, *, without: tuple[str, ...] = ()) -> Vec3:
     """h⁻¹ v, with the pivots of LDLᵀ replaced by their absolute values; 1/p is p/(p² + δ²), so that 1/0 is 0.
 
     With diagonal pivoting, so that an axis without a gap shows in the last pivot and not in the rounding of the others.
@@ -19,8 +22,11 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
         h: Symmetric, of any signature.
         b: QᵀA, whose size decides what is rounding.
         v: The right-hand side, the torque.
+        without: Names in `GUARDS` to leave out, static. Without *absolute pivots* it is h⁻¹ v, which leads to a saddle
+            where h is indefinite; without *free axes* the solution keeps its part along an axis without a gap.
     """
     delta, torque = _resolved(b)
+    magnitude = jnp.positive if "absolute pivots" in without else jnp.abs
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     # The largest comes first. What is exchanged here is exchanged back, in reverse, at the end.
@@ -48,18 +54,19 @@ def ascent(h: Mat3, b: Mat3, v: Vec3) -> Vec3:
     pivot = s22 - l12 * s12
     # Quotients: along an axis without a gap these are rounding, and only what is divided XLA computes once.
     last = y2 - l12 * y1
-    x2 = last * jnp.abs(pivot) / (pivot * pivot + square)
-    x1 = (y1 * jnp.abs(s11) - s11 * s12 * x2) / (s11 * s11 + square)
-    x0 = (v0 * jnp.abs(h00) - h00 * (h01 * x1 + h02 * x2)) / (h00 * h00 + square)
+    x2 = last * magnitude(pivot) / (pivot * pivot + square)
+    x1 = (y1 * magnitude(s11) - s11 * s12 * x2) / (s11 * s11 + square)
+    x0 = (v0 * magnitude(h00) - h00 * (h01 * x1 + h02 * x2)) / (h00 * h00 + square)
 
-    # That solution has any part along u, which the last pivot belongs to; where the pivot is 0, the shortest has none.
-    # Without this half of all starts turn about the axis that a matrix of rank 1 leaves free, by up to 90°.
-    u0 = (h01 * l12 - h02) * inverse0
-    fourth = square * square
-    # Where one begins and the other ends is a constant to differentiation, whose δ⁻⁸ float32 does not hold.
-    size = lax.stop_gradient((u0 * u0 + l12 * l12 + 1) * (pivot**4 + fourth) / fourth)
-    part = jnp.where(jnp.abs(last) > torque, jnp.zeros_like(fourth), u0 * x0 - l12 * x1 + x2) / size
-    x0, x1, x2 = x0 - part * u0, x1 + part * l12, x2 - part
+    if "free axes" not in without:
+        # That solution has any part along u, which the last pivot belongs to; where the pivot is 0, the shortest has
+        # none. Without this half of all starts turn about the axis that a matrix of rank 1 leaves free, by up to 90°.
+        u0 = (h01 * l12 - h02) * inverse0
+        fourth = square * square
+        # Where one begins and the other ends is a constant to differentiation, whose δ⁻⁸ float32 does not hold.
+        size = lax.stop_gradient((u0 * u0 + l12 * l12 + 1) * (pivot**4 + fourth) / fourth)
+        part = jnp.where(jnp.abs(last) > torque, jnp.zeros_like(fourth), u0 * x0 - l12 * x1 + x2) / size
+        x0, x1, x2 = x0 - part * u0, x1 + part * l12, x2 - part
 
     x1, x2 = exchange(third, x1, x2)
     x0, x2 = exchange(second, x0, x2)

@@ -38,10 +38,10 @@ def correction(b: Mat3) -> Quaternion:
     """
     b = computed_once(b)
     # f is at least the trace of any rotation of A; less is rounding.
-    return cayley_map(b, jnp.maximum(_sum_of_singular_values(b) - _mat3.trace(b), 0))
+    return cayley_map(b, jnp.maximum(sum_of_singular_values(b) - _mat3.trace(b), 0))
 
 
-def _sum_of_singular_values(a: Mat3) -> jax.Array:
+def sum_of_singular_values(a: Mat3) -> jax.Array:
     """The sum f = s1+s2+s3, signed, by Newton's method from the upper bound √(3I).
 
     It is the largest root of ((f² − I)/2)² = K + 2Jf with I = ‖A‖², K = ‖cof A‖² and J = det A. The same without

@@ -27,9 +27,8 @@ def accuracy(method, dtype):
 
 def timing(method, dtype):
     median = 10 + list(METHODS).index(method)
-    return {
-        "method": method, "dtype": dtype, "batch": 1000, "median_ns": median, "quartile_1_ns": 9.0, "quartile_3_ns": 99.0,
-    }  # fmt: skip
+    quartiles = {"quartile_1_ns": 9.0, "quartile_3_ns": 99.0}
+    return {"method": method, "dtype": dtype, "batch": 1000, "median_ns": median, **quartiles}
 
 
 def contender(name, dtype="float32", *, gradient=True):
@@ -57,7 +56,12 @@ def price(guard, dtype):
 @pytest.fixture
 def report():
     pairs = [(method, dtype) for method in METHODS for dtype in ("float32", "float64")]
-    contenders = [contender(DEFAULT_METHOD), contender("Peer"), contender("Plain", gradient=False), contender("Wide", "float64")]
+    contenders = [
+        contender(DEFAULT_METHOD),
+        contender("Peer"),
+        contender("Plain", gradient=False),
+        contender("Wide", "float64"),
+    ]
     return {
         "environment": ENVIRONMENT,
         "accuracy": [accuracy(*pair) for pair in pairs],
@@ -79,7 +83,9 @@ def bench():
 
 
 def test_every_region_is_filled_and_the_rest_is_left(report, bench):
-    text = "before\n" + "".join(f"<!-- measured: {name} -->\nold\n<!-- /measured -->\nkept\n" for name in readme.REGIONS)
+    text = "before\n" + "".join(
+        f"<!-- measured: {name} -->\nold\n<!-- /measured -->\nkept\n" for name in readme.REGIONS
+    )
     filled = readme.filled(text, report, bench)
     assert "old" not in filled
     assert filled.startswith("before\n")

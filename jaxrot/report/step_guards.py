@@ -1,0 +1,122 @@
+"""The steps of `refine_rotation` with one guard left out, put together from the parts that they are made of."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import jax
+import jax.numpy as jnp
+
+from jaxrot import STEPS, _definite, _mat3, _quaternion
+from jaxrot._choice import computed_once
+from jaxrot._mat3 import Mat3, Vec3
+from jaxrot._quaternion import Quaternion
+from jaxrot._scaling import safe_divide, safe_sqrt, scaled
+from jaxrot.steps import ascent
+from jaxrot.steps.cayley import cayley_map, zhang_shift
+from jaxrot.steps.escape import leave_equilibrium
+from jaxrot.steps.exact_angle import turn_about
+from jaxrot.steps.iteration import iterate
+from jaxrot.steps.quest import sum_of_singular_values
+
+ESCAPE = "escape"
+
+# What every step has in common, and what each has of its own. Only escape is off where the user does not ask for it.
+_COMMON = ("scale", "renormalisation", ESCAPE)
+_OWN = {
+    "torque": ("absolute value", "epsilon"),
+    "torque_exact_angle": ("flat circle",),
+    "newton": ("Zhang's shift", *ascent.GUARDS, "flat circle"),
+    "cayley": ("Zhang's shift", "damping"),
+    "quest": ("root above trace", "damping"),
+}
+GUARDS: Mapping[str, tuple[str, ...]] = MappingProxyType({step: (*_COMMON, *_OWN[step]) for step in STEPS})
+
+
+def one_step(step: str, without: tuple[str, ...] = ()) -> Callable[[jax.Array, jax.Array], jax.Array]:
+    """One step with all guards, `escape` among them, but for those left out.
+
+    Args:
+        step: A name in `STEPS`.
+        without: Names in `GUARDS[step]`.
+
+    Returns:
+        From matrices (..., 3, 3) and quaternions (..., 4) to quaternions: applied n times it makes n steps, the
+        renormalisation left out in all of them. With nothing left out, and with escape alone, it is the library's own
+        program.
+    """
+    own = tuple(name for name in without if name in _OWN[step])
+
+    def correction(b: Mat3) -> Quaternion:
+        return _CORRECTIONS[step](b, own)
+
+    def advance(matrix: jax.Array, quaternion: jax.Array) -> jax.Array:
+        a = _mat3.components(matrix)
+        if "scale" not in without:
+            a = scaled(a)
+        zero = a[0][0] * 0
+        w, x, y, z = _quaternion.components(quaternion)
+        q = (w + zero, x + zero, y + zero, z + zero)
+        if ESCAPE not in without:
+            q = leave_equilibrium(a, q)
+        if "renormalisation" not in without:
+            return _quaternion.stack(iterate(correction, a, q, 1))
+        b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
+        return _quaternion.stack(_quaternion.product(q, correction(b)))
+
+    return advance
+
+
+def _torque(b: Mat3, without: tuple[str, ...]) -> Quaternion:
+    epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(_mat3.squared_norm(b))
+    one = jnp.ones_like(epsilon)
+    size = _mat3.trace(b) if "absolute value" in without else jnp.abs(_mat3.trace(b))
+    inverse = safe_divide(one, size if "epsilon" in without else size + epsilon)
+    return _quaternion.exponential(_mat3.scale_vector(_mat3.axial(b), inverse))
+
+
+def _torque_exact_angle(b: Mat3, without: tuple[str, ...]) -> Quaternion:
+    torque = _mat3.axial(b)
+    return _turn_about(_mat3.gap_matrix(b), torque, torque, without)
+
+
+def _newton(b: Mat3, without: tuple[str, ...]) -> Quaternion:
+    b = computed_once(b)
+    h, torque = _mat3.gap_matrix(b), _mat3.axial(b)
+    shifted = h if "Zhang's shift" in without else _mat3.add_to_diagonal(h, zhang_shift(b) * 0.5)
+    return _turn_about(h, torque, ascent.ascent(shifted, b, torque, without=without), without)
+
+
+def _cayley(b: Mat3, without: tuple[str, ...]) -> Quaternion:
+    b = computed_once(b)
+    shift = jnp.zeros_like(b[0][0]) if "Zhang's shift" in without else zhang_shift(b)
+    return _cayley_map(b, shift, without)
+
+
+def _quest(b: Mat3, without: tuple[str, ...]) -> Quaternion:
+    b = computed_once(b)
+    shift = sum_of_singular_values(b) - _mat3.trace(b)
+    return _cayley_map(b, shift if "root above trace" in without else jnp.maximum(shift, 0), without)
+
+
+def _turn_about(h: Mat3, torque: Vec3, axis: Vec3, without: tuple[str, ...]) -> Quaternion:
+    return turn_about(h, torque, axis, flat=0.0) if "flat circle" in without else turn_about(h, torque, axis)
+
+
+def _cayley_map(b: Mat3, shift: jax.Array, without: tuple[str, ...]) -> Quaternion:
+    """Without damping: a solve for definite matrices, without exchanges, in the place of the damped one."""
+    if "damping" not in without:
+        return cayley_map(b, shift)
+    h = _mat3.add_to_diagonal(_mat3.gap_matrix(b), shift * 0.5)
+    x, y, z = _mat3.scale_vector(_definite.solve(h, _mat3.axial(b)), 0.5)
+    return (jnp.ones_like(x), x, y, z)
+
+
+_CORRECTIONS: Mapping[str, Callable[[Mat3, tuple[str, ...]], Quaternion]] = MappingProxyType(
+    {
+        "torque": _torque,
+        "torque_exact_angle": _torque_exact_angle,
+        "newton": _newton,
+        "cayley": _cayley,
+        "quest": _quest,
+    }
+)

@@ -1,0 +1,107 @@
+"""The starts from which the steps are judged, and the promises that a step keeps from them."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxrot import _mat3, _quaternion
+from jaxrot.families import half_turn_starts
+from jaxrot.measuring import domain
+from jaxrot.measuring.judging import Judged, judge
+from jaxrot.report.verdict import Verdict, judge_contract
+
+# A warm start 45° off, one 135° off, one at the nearest rotation, and one exactly half a turn off, which stands still.
+NEAR, FAR, NEAREST, HALF_TURN = range(4)
+
+# Enough to converge where the step does: a linear one at a rate of ¾ to the last digit of float32.
+ITERATIONS = {"torque": 60, "torque_exact_angle": 30, "newton": 8, "cayley": 8, "quest": 2}
+
+# In units of eps, beside the contract: how long the quaternion may be beyond 1, and how far a start that is nearest may
+# move where it is not the only one.
+_LENGTH_BOUND = 4
+_KEPT_BOUND = 32
+
+
+class Posed(NamedTuple):
+    """Matrices and starts, one of each a row.
+
+    Attributes:
+        judged: The matrices; every one comes as often as there are kinds of starts.
+        starts: Unit quaternions, shape (n, 4).
+        kind: `NEAR`, `FAR`, `NEAREST` or `HALF_TURN`, shape (n,).
+    """
+
+    judged: Judged
+    starts: np.ndarray
+    kind: np.ndarray
+
+
+def pose(sets: Mapping[str, np.ndarray], dtype: str) -> Posed:
+    """The starts for matrices of shape (count, 3, 3), by name; random axes, always the same."""
+    kinds = (NEAR, FAR, NEAREST, HALF_TURN)
+    judged = judge({name: np.concatenate([part] * len(kinds)) for name, part in sets.items()}, dtype)
+    kind = np.concatenate([np.repeat(kinds, len(part)) for part in sets.values()])
+    count = len(kind)
+    nearest = np.where(judged.is_finite[:, None, None], judged.solution.rotation, np.eye(3)).astype(dtype)
+    axes = np.where(judged.is_finite[:, None, None], judged.solution.right, np.eye(3))
+    opposite = half_turn_starts(nearest, axes)[np.arange(count) % 3, np.arange(count)]
+    rotation = np.where((kind == HALF_TURN)[:, None, None], opposite, nearest)
+    axis = np.random.default_rng(0).standard_normal((3, count))
+    angle = np.choose(kind, (np.pi / 4, 3 * np.pi / 4, 0, 0))
+    turn = np.stack([np.cos(angle / 2), *(np.sin(angle / 2) * axis / np.linalg.norm(axis, axis=0))], -1).astype(dtype)
+    return Posed(judged, np.asarray(_turned(jnp.asarray(rotation), jnp.asarray(turn))), kind)
+
+
+@jax.jit
+def _turned(rotation: jax.Array, turn: jax.Array) -> jax.Array:
+    q = _quaternion.from_rotation(_mat3.components(rotation))
+    return _quaternion.stack(_quaternion.normalise(_quaternion.product(q, _quaternion.components(turn))))
+
+
+@jax.jit
+def _rotation(quaternion: jax.Array) -> jax.Array:
+    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(quaternion)))
+
+
+def judge_step(
+    first: Callable[[jax.Array, jax.Array], jax.Array],
+    others: Callable[[jax.Array, jax.Array], jax.Array],
+    iterations: int,
+    posed: Posed,
+    batch: int,
+) -> Verdict:
+    """Iterates from every start and judges what is reached.
+
+    Args:
+        first: The first step, for a batch of that size: from matrices and quaternions to quaternions.
+        others: Those after it.
+        iterations: How many steps, the first included.
+        posed: The starts.
+        batch: At least as many as there are starts; what is left is filled up.
+
+    Returns:
+        The errors of the contract; the quaternion's length; and *kept*: how far the start was left where it was
+        nearest and not the only one.
+    """
+    judged, count = posed.judged, len(posed.kind)
+    matrices = jnp.asarray(np.resize(judged.matrices, (batch, 3, 3)))
+    q = first(matrices, jnp.asarray(np.resize(posed.starts, (batch, 4))))
+    for _ in range(iterations - 1):
+        q = others(matrices, q)
+    reached, rotation = np.asarray(q)[:count], np.asarray(_rotation(q))[:count]
+    contract = judge_contract(rotation, judged)
+    eps = float(np.finfo(judged.matrices.dtype).eps)
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.abs(np.linalg.norm(reached.astype(np.longdouble), axis=1) - 1) / (_LENGTH_BOUND * eps)
+        moved = np.linalg.norm((rotation - np.asarray(_rotation(jnp.asarray(posed.starts)))).astype(float), axis=(1, 2))
+    is_free = judged.is_normal & (judged.condition >= domain.largest_condition(judged.matrices.dtype.name))
+    kept = np.where(is_free & (posed.kind == NEAREST), moved / (_KEPT_BOUND * eps), 0)
+    is_finite = contract.is_finite & np.isfinite(reached).all(axis=1)
+    more = {
+        name: np.where(judged.is_finite, np.where(is_finite, over, np.inf), 0.0).astype(float)
+        for name, over in (("length", length), ("kept", kept))
+    }
+    return Verdict({**contract.over_bound, **more}, is_finite)
