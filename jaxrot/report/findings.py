@@ -111,11 +111,11 @@ def _nearest(beside: Beside, of_gradients: bool) -> str:
         ratio = time.median / default.median
         is_apart = default.quartile_3 < time.quartile_1 or time.quartile_3 < default.quartile_1
         words.append(
-            f"{fastest.name} takes {ratio:.2g} times as long as {jaxrot.DEFAULT_METHOD} in {dtype}"
+            f"{fastest.name} in {dtype}, {ratio:.2g} times the time of {jaxrot.DEFAULT_METHOD}"
             if is_apart
-            else f"{fastest.name} is within the spread of {jaxrot.DEFAULT_METHOD} in {dtype}"
+            else f"{fastest.name} in {dtype}, within the spread of {jaxrot.DEFAULT_METHOD}"
         )
-    return f" (the fastest, {'; '.join(words)})" if words else ""
+    return f" (the fastest is {'; '.join(words)})" if words else ""
 
 
 def _time(contender: Contender, of_gradients: bool) -> Spread | None:

@@ -20,6 +20,8 @@ _STYLES = {
 
 def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
     """The picture as PNG, one panel a dtype."""
+    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+
     dtypes = list(dict.fromkeys(entry.dtype for entry in entries))
     figure = new_figure((1.5 + 5.7 * len(dtypes), 5.4))
     figure.suptitle(
@@ -38,11 +40,13 @@ def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
             times = [entry.time.median for entry in line]
             errors = [max(entry.error.percentile_99, eps / 10) for entry in line]
             (handles[step],) = axes.plot(times, errors, color=color, marker=marker, markersize=6, linewidth=1.5)
-            for entry, error in zip(line, errors, strict=True):
-                axes.annotate(
-                    str(entry.iterations), (entry.time.median, error), xytext=(5, 4), textcoords="offset points",
-                    fontsize=8, color=color,
-                )  # fmt: skip
+            for k, entry in enumerate(line):
+                # Once it has converged the points lie on one another, and so would their numbers.
+                if k == 0 or errors[k] < 0.8 * errors[k - 1]:
+                    axes.annotate(
+                        str(entry.iterations), (times[k], errors[k]), fontsize=8, color=color,
+                        xytext=(5, -11 if step == PAPER else 4), textcoords="offset points",
+                    )  # fmt: skip
         for entry in (entry for entry in of_dtype if entry.step == COLD_START):
             handles[COLD_START] = axes.axvline(entry.time.median, color="0.4", linewidth=1, linestyle="--")
             (mark,) = axes.plot(entry.time.median, max(entry.error.percentile_99, eps / 10), "k*", markersize=11)
@@ -50,6 +54,9 @@ def draw_warm_starts(entries: Sequence[WarmStart], input_name: str) -> bytes:
         axes.axhline(eps, color="0.6", linewidth=0.8, linestyle=":")
         axes.text(0.99, eps, f"eps = {eps:.1e}", transform=axes.get_yaxis_transform(), ha="right", va="bottom",
                   fontsize=7, color="0.4")  # fmt: skip
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(True, which="major", color="0.9", linewidth=0.6)
         axes.set_axisbelow(True)
         axes.set_title(f"{dtype}, batch {of_dtype[0].batch:,}", fontsize=10)

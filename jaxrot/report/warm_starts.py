@@ -17,7 +17,7 @@ from jaxrot.report.peers import paper_code
 from jaxrot.report.peers.peer import UnavailableError
 
 COLD_START = f"cold start, {jaxrot.DEFAULT_METHOD}"
-PAPER = "paper's C++: torque"
+PAPER = "C++ torque (paper)"
 ANGLE_DEGREES = 10.0
 
 _ITERATIONS = {

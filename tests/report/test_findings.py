@@ -61,7 +61,7 @@ def test_a_report_opens_with_three_sentences():
     text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], beside=beside)
     assert text.count("\n") == 2
     assert "for values no peer lies below and left of jaxrot's front" in text
-    assert f"other takes 5 times as long as {DEFAULT} in float32" in text
+    assert f"the fastest is other in float32, 5 times the time of {DEFAULT}" in text
     assert "gradients" not in text, "there was none"
 
 

@@ -17,14 +17,20 @@ PEERS: Mapping[str, Source] = MappingProxyType(
         "SciPy align_vectors": Source(
             "scipy Rotation.align_vectors, one matrix a call", ("scipy",), scipy_rotation.align_vectors, 500
         ),
-        "RoMa svd": Source("roma.special_procrustes(method='svd')", ("torch", "roma"), roma_procrustes.svd),
-        "RoMa horn": Source("roma.special_procrustes(method='horn')", ("torch", "roma"), roma_procrustes.horn),
-        "Warp svd3": Source("warp.svd3, on the CPU", ("warp",), warp_svd.on_cpu),
-        "Warp svd3, CUDA": Source("warp.svd3, on the GPU", ("warp",), warp_svd.on_cuda),
-        "paper's C++: Irving": Source("Müller et al. 2016, appendix C, with Eigen", (), paper_code.irving),
-        "paper's C++: torque": Source(
+        "RoMa svd": Source(
+            "roma.special_procrustes(method='svd'); its derivative is damped by an absolute 1e-5",
+            ("torch", "roma"),
+            roma_procrustes.svd,
+        ),
+        "RoMa horn": Source(
+            "roma.special_procrustes(method='horn'), likewise", ("torch", "roma"), roma_procrustes.horn
+        ),
+        "Warp svd3": Source("warp.svd3 on the CPU; its derivative has absolute thresholds", ("warp",), warp_svd.on_cpu),
+        "Warp svd3, CUDA": Source("warp.svd3 on the GPU, likewise", ("warp",), warp_svd.on_cuda),
+        "C++ Irving (paper)": Source("Müller et al. 2016, appendix C, with Eigen", (), paper_code.irving),
+        "C++ torque (paper)": Source(
             "Müller et al. 2016, appendix D, 20 iterations from Quat(A), with Eigen", (), paper_code.torque
         ),
-        "Eigen JacobiSVD": Source("C++, with the sign mended", (), paper_code.jacobi_svd),
+        "C++ JacobiSVD (Eigen)": Source("Eigen's, with the sign mended", (), paper_code.jacobi_svd),
     }
 )
