@@ -20,14 +20,14 @@ def solve(matrix: jax.Array) -> jax.Array:
         (..., 3, 3) rotations, for det A ≤ 0 too; the identity for A = 0. The root loses digits as it becomes double,
         s2+s3 → 0, and the adjugate where two gaps are small, near −R.
 
-    Cost: about 330 flops, six square roots, an arc tangent, a sine and a cosine.
+    Cost: about 430 flops, six square roots, an arc tangent, a sine and a cosine.
     Source: Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987: [25] of Sarabandi et al.
     2020, whose "dominant" eigenvalue, largest in modulus, must be the algebraically largest.
     """
     a = unit_scaled(_mat3.components(matrix))
     columns = _quaternion.davenport_columns(_mat3.scale(a, -1.0), quartic_root(a))
     q = _quaternion.normalise(_quaternion.largest_column(_quaternion.adjugate(columns)))
-    return _mat3.stack(_quaternion.to_rotation(q))
+    return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
 
 
 def quartic_root(a: Mat3) -> jax.Array:
