@@ -96,7 +96,7 @@ def outside_domain(method: Method, sample: Sample) -> str | None:
     if limit >= domain.largest_condition(sample.dtype):
         return None
     if method.exact and limit == 0:
-        return "exact, but declares no κ up to which its error is a few eps"
+        return "exact, but for no κ does it declare an error of a few eps"
     # To rounding: a rotation is one, κ = 1/2, with the digits that its dtype has.
     rounding = 1 + 8 * float(np.finfo(sample.dtype).eps)
     if method.exact and largest > limit * rounding:
@@ -185,7 +185,7 @@ def error_on(rotation: np.ndarray, judged: Judged) -> float:
 
 
 def _step(step: str, iterations: int) -> Candidate:
-    name = f"{step}, {iterations} iteration{'' if iterations == 1 else 's'}"
+    name = f"{step} ({iterations} iteration{'' if iterations == 1 else 's'})"
     return Candidate(name, None, step, iterations, np.inf)
 
 

@@ -34,8 +34,8 @@ def recommend(
             judged in float32, and its results are rounded after that.
 
     Returns:
-        The fastest candidate whose largest error on the sample is at most tolerance / 2; where the quartiles of its
-        times and of others overlap, the one of these with the smallest error. Where nothing meets that, `meets` is
+        The fastest candidate whose largest error on the sample is at most tolerance / 2; of those whose median time is
+        within its upper quartile, the one with the smallest error. Where nothing meets that, `meets` is
         False and it is the candidate with the smallest error. Times differ from run to run, and a choice between
         candidates that take about the same time with them.
 
@@ -58,8 +58,8 @@ def recommend(
 
     Raises:
         ValueError: Wrong shape, no matrix, none that is finite, tolerance not positive, `previous` no rotations, dtype
-            unknown, or float64 where x64 is off.
-        TypeError: Complex, non-numeric or traced arrays, tolerance no number.
+            neither float32 nor float64, or float64 where x64 is off.
+        TypeError: Complex, non-numeric or traced arrays, tolerance no number, dtype none at all.
     """
     return recommend_step_by_step(matrices, tolerance, previous, dtype, lambda step: None)
 
@@ -140,9 +140,9 @@ def _step_name(step: str) -> str:
 
 
 def _cheapest(timed: list[Candidate]) -> Candidate:
-    """The most accurate of those that the spread of times does not tell from the fastest."""
+    """The most accurate of those whose median is within the spread of the fastest."""
     _, slow_quartile = timed[0].time_quartiles_ns
-    return min((each for each in timed if each.time_quartiles_ns[0] <= slow_quartile), key=lambda each: each.error)
+    return min((each for each in timed if each.time_ns <= slow_quartile), key=lambda each: each.error)
 
 
 def _check_tolerance(tolerance: float) -> float:

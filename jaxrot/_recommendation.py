@@ -75,9 +75,12 @@ class Recommendation(NamedTuple):
         time = f"{number(self.time_ns)} ns a matrix ({number(low)}-{number(high)}) in batches of {self.batch:,}"
         bound = f"at most 1/{self.margin:g} of it"
         if self.meets:
+            error = f"its largest error is {number(self.error)}, {bound}"
+            if self.undetermined == self.sample:
+                error = "no error is defined on them"
             return (
                 f"{self.name} is the cheapest that meets the tolerance {number(self.tolerance)} on {count} in"
-                f" {self.dtype}: its largest error is {number(self.error)}, {bound}, and it takes {time}."
+                f" {self.dtype}: {error}, and it takes {time}."
             )
         text = (
             f"Nothing meets the tolerance {number(self.tolerance)} on {count} in {self.dtype}, with a largest error of"
@@ -89,8 +92,8 @@ class Recommendation(NamedTuple):
         sentences = []
         if faster := [each.name for each in self.runners_up if each.time_ns < self.time_ns]:
             sentences.append(
-                f"Of candidates as fast within the spread of times it has the smallest error; {listed(faster)} had a"
-                " smaller median."
+                f"{listed(faster)} had a smaller median, but within the spread they are as fast, and"
+                f" {self.name} has the smallest error."
             )
         for each in self.runners_up:
             if each.name == DEFAULT_METHOD:
@@ -101,11 +104,11 @@ class Recommendation(NamedTuple):
         sentences = []
         if self.excluded:
             sentences.append(
-                f"Not considered, because these matrices are outside their domain: {_some(self.excluded)}."
+                f"Not considered, because their declared domain does not hold these matrices: {_some(self.excluded)}."
             )
         if self.not_finite:
             sentences.append(
-                f"{self.not_finite:,} of {_matrices(self.given)} hold a NaN or an infinity and are left out."
+                f"{self.not_finite:,} of {_matrices(self.given)} left out: NaN or infinity in the matrix or its start."
             )
         if self.undetermined:
             sentences.append(

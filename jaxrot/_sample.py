@@ -84,7 +84,7 @@ def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLik
         starts = starts[is_finite]
     if not is_finite.any():
         raise ValueError(
-            f"matrices must hold at least one without a NaN or an infinity; got {len(a):,} with one in {a.dtype}"
+            f"matrices must hold a finite one, with a finite start in previous; got none of {len(a):,} in {a.dtype}"
         )
     given, a = len(a), a[is_finite]
     condition, relative_s3 = _survey(a)

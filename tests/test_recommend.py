@@ -24,7 +24,7 @@ LIMITED_TO_ROTATIONS = {"foam", "higham_newton", "taylor_iterated"}
 
 def fake_times(compiled, matrices, batch, *, budget_s, starts=None):
     def entry(name):
-        step, _, iterations = name.partition(", ")
+        step, _, iterations = name.partition(" (")
         ns = NS_A_STEP[step] * int(iterations.split()[0]) if iterations else NS.get(name, 300)
         return Timing(name, matrices.dtype.name, batch, ns, 0.96 * ns, 1.04 * ns, ns, 5, 1, 1.0)
 
@@ -114,7 +114,7 @@ def test_the_error_is_that_of_the_function_on_the_matrices(on_noise):
 def test_what_was_left_out_and_what_is_not_determined_is_counted(on_inverted):
     assert (on_inverted.given, on_inverted.not_finite, on_inverted.sample) == (203, 2, 201)
     assert on_inverted.undetermined == 1
-    assert "2 of 203 matrices hold a NaN or an infinity" in on_inverted.statement
+    assert "2 of 203 matrices left out: NaN or infinity" in on_inverted.statement
     assert "of 1 matrix is not determined" in on_inverted.statement
 
 
@@ -222,7 +222,7 @@ def test_with_previous_rotations_a_step_and_few_iterations_are_recommended(warm,
     assert warm.step in STEPS
     assert (warm.method, warm.iterations) == (None, 1)
     names = [warm.name, *(each.name for each in (*warm.runners_up, *warm.too_inaccurate)), *warm.excluded]
-    assert [sum(name.startswith(f"{step}, ") for name in names) for step in STEPS] == [1] * len(STEPS)
+    assert [sum(name.startswith(f"{step} (") for name in names) for step in STEPS] == [1] * len(STEPS)
     assert DEFAULT_METHOD in names
     rotation = jax.jit(warm.apply)(*frames)
     assert reference.forward_error(np.asarray(rotation), frames[0]).max() <= 1e-2
@@ -294,7 +294,11 @@ def test_times_are_measured_on_this_machine(inverted, monkeypatch):
         ({"matrices": np.ones((3, 4))}, ValueError, r"matrices must be a real array of shape \(..., 3, 3\)"),
         ({"matrices": np.ones((3, 3), complex)}, TypeError, "matrices must be a real array"),
         ({"matrices": np.ones((0, 3, 3))}, ValueError, r"at least one matrix; got shape \(0, 3, 3\)"),
-        ({"matrices": np.full((2, 3, 3), np.nan)}, ValueError, "without a NaN or an infinity; got 2 with one"),
+        (
+            {"matrices": np.full((2, 3, 3), np.nan)},
+            ValueError,
+            "must hold a finite one, with a finite start in previous; got none of 2",
+        ),
         ({"tolerance": 0.0}, ValueError, "tolerance must be finite and > 0; got 0.0"),
         ({"tolerance": -1e-3}, ValueError, "tolerance must be finite and > 0"),
         ({"tolerance": np.nan}, ValueError, "tolerance must be finite and > 0; got nan"),

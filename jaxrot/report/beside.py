@@ -11,7 +11,7 @@ from jaxrot.measuring import gradient_reference
 from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
 from jaxrot.measuring.judging import Judged
 from jaxrot.measuring.timing import fill_batch, interleave
-from jaxrot.report.contenders import Beside, Contender, Quantiles, Spread, quantiles, spread
+from jaxrot.report.contenders import Beside, Contender, Quantiles, quantiles, spread
 from jaxrot.report.peers import PEERS
 from jaxrot.report.peers.jax_linalg import in_jax
 from jaxrot.report.peers.peer import Peer, UnavailableError, make_peer
@@ -30,7 +30,7 @@ def measure_beside(
     """Judges and times the methods and every peer that is installed.
 
     Args:
-        methods: Names from `jaxrot.METHODS`, jaxrot's own front.
+        methods: Names from `jaxrot.METHODS`, jaxrot's own front and the default method.
         judged: "input" and "families", in one dtype.
         batch: Matrices in a call; a peer that is too slow for it gets fewer.
         budget_s: Seconds for the rounds.
@@ -68,7 +68,7 @@ def measure_beside(
         gradient = samples.get(_gradient_of(name))
         contenders.append(
             contender._replace(
-                time=spread(samples[name], contender.batch),
+                time=spread(samples[name], contender.batch) if name in samples else None,
                 gradient_time=None if gradient is None else spread(gradient, contender.batch),
             )
         )
@@ -93,6 +93,11 @@ def _gradient_of(name: str) -> str:
 
 
 def _calls(name: str, peer: Peer, batch: int, matrices: np.ndarray) -> dict[str, Callable[[], object]]:
+    matrices = matrices[_is_number(matrices)]
+    if peer.accepts is not None:
+        matrices = matrices[peer.accepts(matrices)]
+    if not len(matrices):
+        return {}
     own, bar = peer.load(fill_batch(matrices, batch)), peer.load(_cotangents(batch, matrices.dtype))
     calls: dict[str, Callable[[], object]] = {name: lambda: peer.value(own)}
     if (pullback := peer.pullback) is not None:
@@ -127,7 +132,7 @@ def _judge(
         no_result=int(np.sum(part.is_finite & ~_is_number(rotation))),
         outside=int(errors.is_outside.sum()),
         error=quantiles(errors.forward),
-        time=Spread(np.nan, np.nan, np.nan),
+        time=None,
         gradient_error=gradient_error,
         gradient_no_number=no_number,
         families_no_number=families,
@@ -136,7 +141,7 @@ def _judge(
 
 
 def _rotations(peer: Peer, matrices: np.ndarray, batch: int) -> np.ndarray:
-    return run_in_chunks(lambda part: peer.unload(peer.value(peer.load(part))), matrices, batch)
+    return _run(lambda part: peer.unload(peer.value(peer.load(part))), matrices, batch)
 
 
 def _gradients(
@@ -144,7 +149,14 @@ def _gradients(
 ) -> np.ndarray:
     """Cotangents of A; those of R repeat from chunk to chunk, as `_gradient_error` expects."""
     bar = peer.load(_cotangents(batch, matrices.dtype))
-    return run_in_chunks(lambda part: peer.unload(pullback(peer.load(part), bar)[1]), matrices, batch)
+    return _run(lambda part: peer.unload(pullback(peer.load(part), bar)[1]), matrices, batch)
+
+
+def _run(call: Callable[[np.ndarray], np.ndarray], matrices: np.ndarray, batch: int) -> np.ndarray:
+    """In chunks, NaN where the matrix is not finite: some packages refuse a whole batch for one NaN."""
+    is_finite = _is_number(matrices)[:, None, None]
+    found = run_in_chunks(call, np.where(is_finite, matrices, np.eye(3, dtype=matrices.dtype)), batch)
+    return np.where(is_finite, found, np.nan)
 
 
 def _gradient_error(gradient: np.ndarray, judged: Judged, batch: int) -> Quantiles | None:

@@ -1,5 +1,6 @@
 """Tables of what stands beside each other: jaxrot and its peers, the steps from a warm start, this run and another."""
 
+import math
 from collections.abc import Sequence
 
 from jaxrot.measuring.words import number
@@ -17,7 +18,7 @@ def contenders_table(contenders: Sequence[Contender], dtype: str) -> Table:
     rows = []
     for contender in sorted(
         (contender for contender in contenders if contender.dtype == dtype),
-        key=lambda contender: (not contender.is_own, contender.time.median),
+        key=lambda contender: (not contender.is_own, contender.time.median if contender.time else math.inf),
     ):
         has_gradient = contender.gradient_time is not None
         rows.append(
@@ -52,7 +53,7 @@ def verdicts(contenders: Sequence[Contender]) -> list[str]:
         for contender in beyond_front(contenders, of_gradients=of_gradients):
             sentences.append(
                 f"**{contender.name} in {contender.dtype} lies beyond jaxrot's front for {what}**: no method of"
-                " jaxrot's is as accurate in as short a time."
+                " jaxrot's measured here is as accurate in as short a time."
             )
     return sentences
 
@@ -119,12 +120,17 @@ def compared_sentence(comparison: Comparison) -> str:
     ]
     faster = sum(change.verdict == "faster" for change in comparison.times)
     worse = [f"{change.method} ({change.dtype})" for change in comparison.errors if change.verdict == "worse"]
-    return (
-        f"Against {comparison.name} ({comparison.environment.get('date', 'no date')},"
-        f" {comparison.environment.get('jaxrot', 'unknown version')}): all methods together take"
-        f" {comparison.machine:.2f} times as long; slower: {', '.join(slower) or 'none'}; faster: {faster};"
-        f" less accurate: {', '.join(worse) or 'none'}."
+    environment = comparison.environment
+    clauses = []
+    if comparison.times:
+        clauses.append(f"the machine's share in all times is {comparison.machine:.2f}")
+        clauses += [f"slower: {', '.join(slower) or 'none'}", f"faster: {faster}"]
+    if comparison.errors:
+        clauses.append(f"less accurate: {', '.join(worse) or 'none'}")
+    head = (
+        f"Against {comparison.name} ({environment.get('date', 'no date')}, {environment.get('jaxrot', 'no version')})"
     )
+    return " ".join([f"{head}: {'; '.join(clauses) or 'nothing to compare'}.", *comparison.remarks])
 
 
 def _pair(error: Quantiles | None) -> str:

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--compare", type=Path, metavar="OLD.json", help="the report.json of an earlier run")
     parser.add_argument("--bench", action="store_true", help="instead: the library's own speed goals")
-    parser.add_argument("--quick", action="store_true", help="under 20 seconds: one dtype, one batch size, less of all")
+    parser.add_argument("--quick", action="store_true", help="under half a minute: one dtype, one batch size, no steps")
 
 
 def run(options: argparse.Namespace) -> int:

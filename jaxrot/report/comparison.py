@@ -8,9 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxrot.console.errors import UserError
+from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
 from jaxrot.report.measurement import WHOLE, Results
 
+# The median of fewer ratios is as good as the ratio of the method that is looked at.
+_FEWEST_FOR_MACHINE = 4
 EXPECTED = "expected the report.json of an earlier run"
 
 
@@ -67,9 +70,10 @@ class Comparison(NamedTuple):
     Attributes:
         name: Of the earlier file.
         environment: Of the earlier run.
-        machine: Median of all ratios of times: what changed for all methods alike.
+        machine: Median of all ratios of times: what changed for all methods alike; 1 where they are too few to tell.
         times: One entry a method, dtype and batch size that both runs have.
-        errors: One entry a method and dtype that both have; empty where the input is another.
+        errors: One entry a method and dtype that both have; empty where the input is another. Families count where both
+            runs drew as many matrices.
         remarks: What cannot be compared and why, one sentence each.
     """
 
@@ -97,8 +101,10 @@ def read_report(path: Path) -> dict[str, Any]:
     try:
         for entry in content["timing"]:
             Timing(**entry)
-        known = [(entry["method"], entry["dtype"], entry["outside"]) for entry in content["accuracy"]]
-        is_report = bool(known and content["timing"] and content["environment"] and content["input"]["sets"])
+        for entry in content["accuracy"]:
+            Accuracy(**entry)
+        environment, sets = content["environment"], content["input"]["sets"]
+        is_report = bool(isinstance(environment, dict) and sets and content["accuracy"] and content["timing"])
     except (KeyError, TypeError):
         is_report = False
     if not is_report:
@@ -116,7 +122,9 @@ def compare(name: str, before: dict[str, Any], results: Results, sets: dict[str,
         sets: Names and sizes of the new input's sets.
     """
     remarks = []
-    times = _times([Timing(**entry) for entry in before["timing"]], results.timing)
+    machine, times = _times([Timing(**entry) for entry in before["timing"]], results.timing)
+    if 0 < len(times) < _FEWEST_FOR_MACHINE:
+        remarks.append("Too few times are common to tell the machine's share in them.")
     if not times:
         remarks.append("No method was timed in both runs at the same batch size and dtype.")
     errors: tuple[ErrorChange, ...] = ()
@@ -124,17 +132,16 @@ def compare(name: str, before: dict[str, Any], results: Results, sets: dict[str,
         errors = _errors(before["accuracy"], results)
     else:
         remarks.append("The earlier run was on another input; errors are not compared.")
-    machine = float(np.median([change.ratio for change in times])) if times else 1.0
     return Comparison(name, before["environment"], machine, times, errors, tuple(remarks))
 
 
-def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[TimeChange, ...]:
+def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[float, tuple[TimeChange, ...]]:
+    """The machine's share and the changes."""
     earlier = {(entry.method, entry.dtype, entry.batch): entry for entry in before}
     pairs = [(earlier[key], entry) for entry in now if (key := (entry.method, entry.dtype, entry.batch)) in earlier]
-    if not pairs:
-        return ()
-    machine = float(np.median([new.median_ns / old.median_ns for old, new in pairs]))
-    return tuple(
+    ratios = [new.median_ns / old.median_ns for old, new in pairs]
+    machine = float(np.median(ratios)) if len(ratios) >= _FEWEST_FOR_MACHINE else 1.0
+    return machine, tuple(
         TimeChange(
             method=new.method,
             dtype=new.dtype,
@@ -158,16 +165,20 @@ def _verdict(old: Timing, new: Timing, machine: float) -> str:
 
 
 def _errors(before: Sequence[dict[str, Any]], results: Results) -> tuple[ErrorChange, ...]:
+    now = [entry._asdict() for entry in results.accuracy]
+    # A run with --quick draws fewer matrices of each family; what is outside of them says nothing about another run's.
+    common = {_set(entry) for entry in before} & {_set(entry) for entry in now}
+
     def outside(entries: Sequence[dict[str, Any]], method: str, dtype: str) -> int:
-        # The input's parts are in the whole.
         return sum(
             entry["outside"]
             for entry in entries
             if (entry["method"], entry["dtype"]) == (method, dtype)
+            and _set(entry) in common
+            # The input's parts are in the whole.
             and (entry["group"] != "input" or entry["set_name"] == WHOLE)
         )
 
-    now = [entry._asdict() for entry in results.accuracy]
     earlier = {(entry["method"], entry["dtype"]): entry for entry in before if entry["set_name"] == WHOLE}
     changes = []
     for entry in now:
@@ -177,6 +188,10 @@ def _errors(before: Sequence[dict[str, Any]], results: Results) -> tuple[ErrorCh
             counts = outside(before, *key), outside(now, *key)
             changes.append(ErrorChange(*key, old, new, *counts, _error_verdict((old, counts[0]), (new, counts[1]))))
     return tuple(changes)
+
+
+def _set(entry: dict[str, Any]) -> tuple[str, str, int]:
+    return entry["group"], entry["set_name"], entry["matrices"]
 
 
 def _error_verdict(old: tuple[float | None, int], new: tuple[float | None, int]) -> str:

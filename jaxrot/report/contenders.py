@@ -51,7 +51,7 @@ class Contender(NamedTuple):
         no_result: Finite matrices for which it gives no rotation (NaN, or it refuses them); their error is infinite.
         outside: Matrices outside the contract, these included.
         error: ‖R − R*‖_F, where R* is determined.
-        time: Of the value.
+        time: Of the value; None where it takes none of the matrices.
         gradient_error: ‖Ā − Ā*‖_F / ‖Ā*‖_F of the cotangents of A for a random one of R, where κ ≤ 1/(128 eps); None
             without a derivative. Infinite where it is no number.
         gradient_no_number: Of the input, matrices whose gradient is no number.
@@ -69,7 +69,7 @@ class Contender(NamedTuple):
     no_result: int
     outside: int
     error: Quantiles | None
-    time: Spread
+    time: Spread | None
     gradient_error: Quantiles | None
     gradient_no_number: int
     families_no_number: tuple[str, ...]

@@ -40,7 +40,7 @@ def on_input(results: Results, dtype: str) -> dict[str, Accuracy]:
 
 def findings(content: Content) -> list[str]:
     """The sentences that open the report: which method, against whom, and where promises break."""
-    second = _peers(content.beside) if content.beside is not None else _warm_starts(content.warm_starts)
+    second = _peers(content.beside) if content.beside is not None else warm_starts_finding(content.warm_starts)
     sentences = [_fastest(content.results, content.dtypes, content.given.name), second]
     return [sentence for sentence in [*sentences, _promises(content.results)] if sentence]
 
@@ -67,7 +67,8 @@ def _fastest(results: Results, dtypes: Sequence[str], input_name: str) -> str:
             best = min(accuracy.values(), key=lambda entry: entry.outside)
             closest.append(f"{best.method} comes closest in {dtype}, outside on {best.outside:,}")
     count = next(iter(on_input(results, dtypes[0]).values())).matrices
-    which = f"keeps the contract on all {count:,} matrices of {input_name}"
+    all_of_them = f"all {count:,} matrices" if count > 1 else "the one matrix"
+    which = f"keeps the contract on {all_of_them} of {input_name}"
     if not kept:
         return f"No method measured {which}: {'; '.join(closest)}."
     none = "; none keeps it in the other dtype: " if closest else ""
@@ -81,6 +82,10 @@ def _against_control(times: dict[str, Timing], chosen: Timing) -> str:
         return ""
     if chosen.quartile_3_ns < control.quartile_1_ns:
         return f", {control.median_ns / chosen.median_ns:.2g} times faster than {CONTROL}"
+    if control.quartile_3_ns < chosen.quartile_1_ns:
+        return (
+            f", {chosen.median_ns / control.median_ns:.2g} times the time of {CONTROL}, which is outside the contract"
+        )
     return f", within the spread of {CONTROL}"
 
 
@@ -91,9 +96,9 @@ def _peers(beside: Beside) -> str:
         if beyond:
             names = listed([f"{contender.name} in {contender.dtype}" for contender in beyond])
             clauses.append(f"for {what} **{names} {'lies' if len(beyond) == 1 else 'lie'} beyond jaxrot's front**")
-        elif any(_time(contender, of_gradients) for contender in beside.contenders if not contender.is_own):
+        elif any(_is_placed(contender, of_gradients) for contender in beside.contenders if not contender.is_own):
             clauses.append(f"for {what} no peer lies below and left of jaxrot's front{_nearest(beside, of_gradients)}")
-    return f"Peers: {'; '.join(clauses)}." if clauses else "No peer could be measured here."
+    return f"Peers: {'; '.join(clauses)}." if clauses else "Peers: no error of theirs could be judged here."
 
 
 def _nearest(beside: Beside, of_gradients: bool) -> str:
@@ -118,11 +123,16 @@ def _nearest(beside: Beside, of_gradients: bool) -> str:
     return f" (the fastest is {'; '.join(words)})" if words else ""
 
 
+def _is_placed(contender: Contender, of_gradients: bool) -> bool:
+    error = contender.gradient_error if of_gradients else contender.error
+    return error is not None and _time(contender, of_gradients) is not None
+
+
 def _time(contender: Contender, of_gradients: bool) -> Spread | None:
     return contender.gradient_time if of_gradients else contender.time
 
 
-def _warm_starts(entries: Sequence[WarmStart]) -> str:
+def warm_starts_finding(entries: Sequence[WarmStart]) -> str:
     """The cheapest number of iterations that is as right as the cold start, in each dtype."""
     clauses = []
     for dtype in dict.fromkeys(entry.dtype for entry in entries):
@@ -136,10 +146,11 @@ def _warm_starts(entries: Sequence[WarmStart]) -> str:
             continue
         best = min(as_right, key=lambda entry: entry.time.median)
         if best.time.quartile_3 < cold.time.quartile_1:
-            share = f"takes {best.time.median / cold.time.median:.2g} times the time of the cold start"
+            share = f"in {best.time.median / cold.time.median:.2g} times the time of the cold start"
         else:
-            share = "is not faster than the cold start, by the spread"
-        clauses.append(f"{best.iterations} {best.step} in {dtype} {share}")
+            share = "in no less time than the cold start, by the spread"
+        plural = "" if best.iterations == 1 else "s"
+        clauses.append(f"{best.iterations} iteration{plural} of {best.step} in {dtype}, {share}")
     if not clauses:
         return ""
     return f"From a start {ANGLE_DEGREES:.0f}° off, to twice the cold start's error: {'; '.join(clauses)}."

@@ -41,9 +41,6 @@ class Size(NamedTuple):
     dtypes: tuple[str, ...] = ("float32", "float64")
 
 
-QUICK = Size(batch=10_000, matrices_a_family=20, starts_a_family=8, budget_s=0.5, dtypes=("float32",))
-
-
 class Time(NamedTuple):
     """What a guard costs in time.
 
@@ -126,7 +123,7 @@ def run_guards(size: Size, advance: Callable[[str], object]) -> Guards:
 
 
 def price_default(size: Size, dtype: str) -> list[Price]:
-    """Every stage of the default method left out in turn; nothing left out comes first."""
+    """Every guard of the default method left out in turn; nothing left out comes first."""
     judged = judge(sample_families(size.matrices_a_family, dtype), dtype)
     count = len(judged.matrices)
     given = jnp.asarray(_gaussian(max(size.batch, count), dtype))

@@ -32,6 +32,7 @@ class Point(NamedTuple):
         error_median: Lower end of its whisker.
         error_max: Upper end.
         kind: `EXACT`, `APPROXIMATION` or `PEER`.
+        is_beyond: For a peer: it is beyond the front of the others.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Point(NamedTuple):
     error_median: float
     error_max: float
     kind: str
+    is_beyond: bool = False
 
 
 class Panel(NamedTuple):
@@ -57,9 +59,13 @@ class Panel(NamedTuple):
 
 
 def pareto_front(points: Sequence[Point]) -> list[Point]:
-    """The points that no other beats: none is at least as fast and as accurate, and better in one. Fastest first."""
+    """The points that no other beats: none is at least as fast and as accurate, and better in one. Fastest first.
+
+    A point whose error is infinite is on no front, however fast it is.
+    """
     front: list[Point] = []
-    for point in sorted(points, key=lambda point: (point.time_ns, point.error)):
+    is_number = [point for point in points if np.isfinite(point.error)]
+    for point in sorted(is_number, key=lambda point: (point.time_ns, point.error)):
         is_twin = bool(front) and (point.time_ns, point.error) == (front[-1].time_ns, front[-1].error)
         if not front or point.error < front[-1].error or is_twin:
             front.append(point)
@@ -110,7 +116,7 @@ def _front_line(panel: Panel, floor: float) -> list[tuple[float, float]]:
 
 def _draw_panel(axes: Any, panel: Panel) -> None:
     eps, floor = np.finfo(panel.dtype).eps, _floor(panel.dtype)
-    front, unbeaten = _own_front(panel), pareto_front(panel.points)
+    front = _own_front(panel)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.axhline(eps, color="0.6", linewidth=0.8, linestyle=":")
@@ -128,8 +134,8 @@ def _draw_panel(axes: Any, panel: Panel) -> None:
         axes.plot([point.time_ns] * 2, ends, color=style["color"], linewidth=1, alpha=0.5, zorder=2)
         axes.plot(
             point.time_ns, _clip(point.error, floor), linestyle="none", markersize=8, zorder=3,
-            markerfacecolor=style["color"] if point in unbeaten else "white", markeredgecolor=style["color"],
-            marker=style["marker"],
+            markerfacecolor=style["color"] if point in front or point.is_beyond else "white",
+            markeredgecolor=style["color"], marker=style["marker"],
         )  # fmt: skip
     # Room for labels beside the outermost points.
     times = [point.time_ns for point in panel.points]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import jaxrot
-from jaxrot.report.contenders import Contender, Quantiles, Spread
+from jaxrot.report.contenders import Contender, Quantiles, Spread, beyond_front
 from jaxrot.report.content import Content
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.maps import draw_condition_maps, draw_scale_map, sorted_methods
@@ -76,11 +76,13 @@ def _panel(
     place: Callable[[Contender], tuple[Quantiles | None, Spread | None]],
 ) -> Panel:
     points = []
+    beyond = beyond_front(contenders, of_gradients=place is _gradient)
     for contender in (contender for contender in contenders if contender.dtype == dtype):
         error, time = place(contender)
         if error is not None and time is not None:
             kind = _kind(contender.name) if contender.is_own else PEER
-            points.append(Point(contender.name, time.median, error.percentile_99, error.median, error.largest, kind))
+            errors = (error.percentile_99, error.median, error.largest)
+            points.append(Point(contender.name, time.median, *errors, kind, contender in beyond))
     return Panel(dtype, max((contender.batch for contender in contenders), default=0), points)
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+import jaxrot
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
 from jaxrot.report import beside, guards, warm_starts
@@ -34,7 +35,7 @@ def number_of_steps(plan: Plan) -> int:
     """How often `measure` calls `advance`, at most."""
     steps = 1 + steps_of_methods(plan)
     if plan.peers_budget_s is not None:
-        steps += beside.number_of_steps(plan.methods)
+        steps += beside.number_of_steps([*plan.methods, jaxrot.DEFAULT_METHOD])
     if plan.warm_starts_budget_s is not None:
         steps += warm_starts.number_of_steps(with_peers=plan.peers_budget_s is not None)
     steps += plan.map_steps is not None
@@ -66,7 +67,8 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
             conditions.append(map_conditions(plan.methods, run, dtype, plan.map_steps))
             scales.append(map_scales(plan.methods, run, dtype))
         if plan.peers_budget_s is not None:
-            front = [point.name for point in pareto_front(methods_panel(found, dtype).points)]
+            on_front = [point.name for point in pareto_front(methods_panel(found, dtype).points)]
+            front = list(dict.fromkeys([*on_front, jaxrot.DEFAULT_METHOD]))
             measured = beside.measure_beside(
                 front, judged, batch=plan.batches[-1], budget_s=plan.peers_budget_s / len(plan.dtypes), advance=advance
             )

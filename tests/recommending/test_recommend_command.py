@@ -59,14 +59,14 @@ def test_previous_rotations_are_read_by_name(tmp_path, monkeypatch, capsys):
     assert main([str(word) for word in words]) == 0
     out = capsys.readouterr().out
     # The starts are the solution, if each is with its matrix.
-    assert out.startswith("newton, 1 iteration is the cheapest")
+    assert out.startswith("newton (1 iteration) is the cheapest")
     assert 'jaxrot.refine_rotation(matrix, rotation, step="newton", iterations=1)' in out
 
 
 def _steps_first(compiled, matrices, batch, **options):
     timings = jaxrot.measuring.timing.time_methods(compiled, matrices, batch, **options)
     return [
-        entry._replace(median_ns=1, quartile_1_ns=1, quartile_3_ns=1) if "," in entry.method else entry
+        entry._replace(median_ns=1, quartile_1_ns=1, quartile_3_ns=1) if "(" in entry.method else entry
         for entry in timings
     ]
 
@@ -105,7 +105,7 @@ def _refused(words, capsys):
         (["{good}", "--tolerance", "1e-3", "--dtype", "float16"], "--dtype float16: expected one of float32, float64"),
         (["{folder}/none.npy", "--tolerance", "1e-3"], "FILE {folder}/none.npy: no such file; expected a .npy or .npz"),
         (["{folder}/flat.npy", "--tolerance", "1e-3"], "FILE {folder}/flat.npy: shape (3, 4); expected"),
-        (["{folder}/nan.npy", "--tolerance", "1e-3"], "at least one without a NaN or an infinity; got 2 with one"),
+        (["{folder}/nan.npy", "--tolerance", "1e-3"], "must hold a finite one"),
         (["{good}", "--tolerance", "1e-3", "--previous", "{folder}/none.npy"], "--previous {folder}/none.npy: no such"),
         (["{good}", "--tolerance", "1e-3", "--previous", "{folder}/nan.npy"], "nan.npy: 2 rotations; expected 20"),
         (["{good}", "--tolerance", "1e-3", "--previous", "{good}"], "previous must hold rotations"),

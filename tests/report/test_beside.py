@@ -139,6 +139,39 @@ def test_every_peer_that_is_here_finds_the_nearest_rotation(name):
             assert np.median(relative.astype(float)) < 0.3
 
 
+def test_a_peer_that_takes_nothing_has_no_time():
+    inverted = -np.eye(3) * np.ones((5, 1, 1))
+    judged = {
+        "input": judge({"own": inverted}, "float64", whole=WHOLE),
+        "families": judge({"easy": inverted}, "float64"),
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(beside, "PEERS", {"SciPy from_matrix": peers.PEERS["SciPy from_matrix"]})
+        measured = measure_beside([], judged, batch=2, budget_s=0.0, advance=lambda step: None)
+    (contender,) = measured.contenders
+    assert (contender.time, contender.no_result) == (None, 5)
+    assert contenders_table(measured.contenders, "float64").rows[0][7] == "-"
+
+
+def test_a_peer_is_timed_on_what_it_takes(monkeypatch):
+    seen = []
+    fast = Peer(lambda a: a, lambda a: seen.append(a) or a, None, np.asarray, 1, "float64", lambda a: a[:, 0, 0] > 0)
+    beside._calls("peer", fast, 7, MATRICES)["peer"]()
+    assert len(seen[0]) == 7
+    assert (seen[0][:, 0, 0] > 0).all()
+
+
+@pytest.mark.parametrize("rest", [MATRICES, MATRICES[:0]], ids=["some", "all"])
+def test_a_nan_is_nobodys_fault(rest):
+    peer = peers.PEERS["SciPy align_vectors"].make("float64")
+    matrices = np.concatenate([rest, np.full((3, 3, 3), np.nan)])
+    judged = {"input": judge({"own": matrices}, "float64", whole=WHOLE), "families": judge({"a": matrices}, "float64")}
+    contender = beside._judge("peer", "", False, peer, 2, judged)
+    assert contender.no_result == contender.outside == 0
+    assert (contender.error is None) == (len(rest) == 0)
+    assert bool(beside._calls("peer", peer, 7, matrices)) == (len(rest) > 0)
+
+
 def test_scipy_refuses_reflections_alone():
     peer = make_peer(peers.PEERS["SciPy from_matrix"], "float64")
     rotation = peer.unload(peer.value(peer.load(MATRICES)))

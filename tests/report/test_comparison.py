@@ -85,11 +85,31 @@ def test_an_error_that_grew_is_worse(then, now, verdict, tmp_path):
     assert ("**worse**" in errors_compared_table(comparison).rows[0]) == (verdict == "worse")
 
 
-def test_matrices_of_the_families_count_too(tmp_path):
-    part = ("foam", 1e-7, 2, "rank_1", "families")
+def test_matrices_of_the_families_count_where_both_runs_drew_as_many(tmp_path):
+    before = written(results(FOUR, [*RIGHT, ("foam", 1e-7, 1, "rank_1", "families")]), tmp_path)
+    now = results(FOUR, [*RIGHT, ("foam", 1e-7, 3, "rank_1", "families")])
+    (change,) = [change for change in compare("old.json", before, now, SETS).errors if change.method == "foam"]
+    assert (change.outside_before, change.outside_now, change.verdict) == (1, 3, "worse")
+    larger = now._replace(
+        accuracy=[entry._replace(matrices=10 if entry.group == "input" else 99) for entry in now.accuracy]
+    )
+    (change,) = [change for change in compare("old.json", before, larger, SETS).errors if change.method == "foam"]
+    assert (change.outside_before, change.outside_now, change.verdict) == (0, 0, "")
+
+
+def test_one_method_alone_is_compared_without_the_machines_share(tmp_path):
     before = written(results(FOUR, RIGHT), tmp_path)
-    comparison = compare("old.json", before, results(FOUR, [*RIGHT, part]), SETS)
-    assert (comparison.errors[0].outside_before, comparison.errors[0].outside_now) == (0, 2)
+    comparison = compare("old.json", before, results([("foam", 200)], RIGHT[:1]), SETS)
+    assert comparison.machine == 1
+    assert verdicts(comparison.times) == {"foam": "slower"}
+    assert "Too few times" in compared_sentence(comparison)
+
+
+def test_what_was_not_compared_is_not_praised(tmp_path):
+    before = written(results([("foam", 100)], RIGHT[:1]), tmp_path)
+    words = compared_sentence(compare("old.json", before, results([("svd", 100)], [("svd", 1e-7)]), {"own": 11}))
+    assert "nothing to compare" in words
+    assert "none" not in words
 
 
 def test_errors_on_another_input_are_not_compared(tmp_path):

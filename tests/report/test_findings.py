@@ -85,7 +85,9 @@ def test_gradients_have_a_front_of_their_own():
     assert [entry.name for entry in beyond_front(contenders, of_gradients=True)] == ["peer"]
 
 
-@pytest.mark.parametrize(("time", "words"), [(50, "1 newton in float32 takes 0.5 times"), (95, "by the spread")])
+@pytest.mark.parametrize(
+    ("time", "words"), [(50, "1 iteration of newton in float32, in 0.5 times"), (95, "by the spread")]
+)
 def test_a_warm_start_is_called_faster_only_beyond_the_spread(time, words):
     def warm(step, iterations, time, error):
         around = Spread(time, time * 0.9, time * 1.1)

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from jaxrot import DEFAULT_METHOD, METHODS
+from jaxrot.measuring.timing import Timing
 from jaxrot.report import readme
 
 ROOT = pathlib.Path(__file__).parent.parent.parent
@@ -27,15 +28,15 @@ def accuracy(method, dtype):
 
 def timing(method, dtype):
     median = 10 + list(METHODS).index(method)
-    quartiles = {"quartile_1_ns": 9.0, "quartile_3_ns": 99.0}
-    return {"method": method, "dtype": dtype, "batch": 1000, "median_ns": median, **quartiles}
+    return Timing(method, dtype, 1000, median, 9.0, 99.0, 8.0, 5, 1, 0.5)._asdict()
 
 
 def contender(name, dtype="float32", *, gradient=True):
     error = {"median": 1e-7, "percentile_99": 2e-7, "largest": "inf"}
     time = {"median": 123.0, "quartile_1": 100.0, "quartile_3": 200.0}
     return {
-        "name": name, "is_own": name == DEFAULT_METHOD, "dtype": dtype, "threads": 2, "error": error, "outside": 3,
+        "name": name, "is_own": name == DEFAULT_METHOD, "dtype": dtype, "threads": 2, "batch": 1000,
+        "error": error, "outside": 3,
         "time": time, "gradient_error": error if gradient else None, "families_no_number": ["zero"],
         "gradient_time": time if gradient else None,
     }  # fmt: skip
@@ -106,7 +107,7 @@ def test_peers_are_those_of_float32(report, bench):
     region = readme.peers_region(report, bench)
     assert "Peers: none beyond." in region
     assert f"| **{DEFAULT_METHOD}** |" in region
-    assert "| Plain | 2 | 1.0e-7 / 2.0e-7 | 3 | 123 | - | - | - |" in region
+    assert "| Plain | 2 | 1,000 | 1.0e-7 / 2.0e-7 | 3 | 123 | - | - | - |" in region
     assert "Wide" not in region
 
 

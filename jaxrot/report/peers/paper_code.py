@@ -75,15 +75,23 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-@functools.cache
 def _library() -> tuple[ctypes.CDLL, int]:
     """The compiled code and its threads."""
+    library = _compiled()
+    if isinstance(library, str):
+        raise UnavailableError(library)
+    return library
+
+
+@functools.cache
+def _compiled() -> tuple[ctypes.CDLL, int] | str:
+    """The compiled code and its threads, or why there is none; tried once."""
     compiler = next(filter(None, map(shutil.which, (os.environ.get("CXX") or "c++", "g++", "clang++"))), None)
     if compiler is None:
-        raise UnavailableError("no C++ compiler")
+        return "no C++ compiler"
     folder = next((place for place in _FOLDERS if (Path(place) / "Eigen").is_dir()), None)
     if folder is None:
-        raise UnavailableError("no Eigen headers")
+        return "no Eigen headers"
     with tempfile.TemporaryDirectory() as place:
         target = Path(place) / "paper_code.so"
         command = [compiler, "-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC", f"-I{folder}"]
@@ -95,7 +103,7 @@ def _library() -> tuple[ctypes.CDLL, int]:
                 library = ctypes.CDLL(str(target))
                 _declare(library)
                 return library, threads
-    raise UnavailableError(f"the C++ does not compile: {(done.stderr.strip().splitlines() or ['no message'])[0]}")
+    return f"the C++ does not compile: {(done.stderr.strip().splitlines() or ['no message'])[0]}"
 
 
 def _declare(library: ctypes.CDLL) -> None:

@@ -22,6 +22,7 @@ class Peer(NamedTuple):
         unload: From its own array to NumPy, (n, 3, 3); NaN where it refused a matrix.
         threads: Threads that compute.
         computes_in: The dtype it computes in, whatever it is given.
+        accepts: From (n, 3, 3) matrices to whether it takes each; None where it takes all. It is timed on these alone.
     """
 
     load: Callable[[np.ndarray], Any]
@@ -30,6 +31,7 @@ class Peer(NamedTuple):
     unload: Callable[[Any], np.ndarray]
     threads: int
     computes_in: str
+    accepts: Callable[[np.ndarray], np.ndarray] | None = None
 
 
 class Source(NamedTuple):
@@ -57,4 +59,7 @@ def make_peer(source: Source, dtype: str) -> Peer:
     missing = [name for name in source.needs if importlib.util.find_spec(name) is None]
     if missing:
         raise UnavailableError(f"{' and '.join(missing)} not installed")
-    return source.make(dtype)
+    try:
+        return source.make(dtype)
+    except (ImportError, AttributeError, OSError) as error:
+        raise UnavailableError(f"it does not start ({' '.join(str(error).split())})") from None

@@ -20,7 +20,17 @@ def from_matrix(dtype: str) -> Peer:
     """`Rotation.from_matrix`, which orthogonalises, and raises for a whole batch where one determinant is ≤ 0."""
     from scipy.spatial.transform import Rotation
 
-    return _peer(dtype, lambda matrices: Rotation.from_matrix(matrices).as_matrix())
+    def is_accepted(matrix: np.ndarray) -> bool:
+        try:
+            Rotation.from_matrix(matrix)
+        except (ValueError, np.linalg.LinAlgError):
+            return False
+        return True
+
+    def accepts(matrices: np.ndarray) -> np.ndarray:
+        return np.array([is_accepted(matrix) for matrix in matrices.astype(np.float64)], dtype=bool)
+
+    return _peer(dtype, lambda matrices: Rotation.from_matrix(matrices).as_matrix(), accepts)
 
 
 def align_vectors(dtype: str) -> Peer:
@@ -32,24 +42,19 @@ def align_vectors(dtype: str) -> Peer:
     def rotations(matrices: np.ndarray) -> np.ndarray:
         return np.stack([Rotation.align_vectors(matrix.T, axes)[0].as_matrix() for matrix in matrices])
 
-    return _peer(dtype, rotations)
+    return _peer(dtype, rotations, lambda matrices: np.ones(len(matrices), bool))
 
 
-def _peer(dtype: str, rotations: Callable[[np.ndarray], np.ndarray]) -> Peer:
-    def is_accepted(matrix: np.ndarray) -> bool:
-        try:
-            rotations(matrix[None])
-        except (ValueError, np.linalg.LinAlgError):
-            return False
-        return True
-
+def _peer(
+    dtype: str, rotations: Callable[[np.ndarray], np.ndarray], accepts: Callable[[np.ndarray], np.ndarray]
+) -> Peer:
     def load(matrices: np.ndarray) -> _Accepted:
-        wide = matrices.astype(np.float64)
-        with warnings.catch_warnings(action="ignore"):
-            places = np.array([is_accepted(matrix) for matrix in wide])
-        return _Accepted(wide[places], places)
+        places = accepts(matrices)
+        return _Accepted(matrices[places].astype(np.float64), places)
 
     def value(accepted: _Accepted) -> tuple[np.ndarray, np.ndarray]:
+        if not len(accepted.matrices):
+            return accepted.matrices, accepted.places
         # SciPy warns where the rotation is not unique; the report judges that itself.
         with warnings.catch_warnings(action="ignore"):
             return rotations(accepted.matrices), accepted.places
@@ -60,4 +65,4 @@ def _peer(dtype: str, rotations: Callable[[np.ndarray], np.ndarray]) -> Peer:
         whole[places] = found
         return whole.astype(dtype)
 
-    return Peer(load, value, None, unload, threads=1, computes_in="float64")
+    return Peer(load, value, None, unload, threads=1, computes_in="float64", accepts=accepts)

@@ -40,7 +40,7 @@ def _peer(device: str, dtype: str) -> Peer:
         wp.launch(rotations, dim=len(matrix), inputs=[matrix], outputs=[rotation], device=device)
 
     def value(matrix: Any) -> Any:
-        rotation = wp.empty_like(matrix)
+        rotation = wp.empty_like(matrix, requires_grad=False)
         launch(matrix, rotation)
         wp.synchronize_device(device)
         return rotation
