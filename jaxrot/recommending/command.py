@@ -17,7 +17,7 @@ from jaxrot.console.extras import check_installed
 from jaxrot.console.progress import progress
 from jaxrot.measuring.words import number
 from jaxrot.report.inputs import Input, read_input
-from jaxrot.report.tables import Table, as_text
+from jaxrot.report.writing.tables import Table, as_text
 
 _DTYPES = ("float32", "float64")
 _WIDTH = 100

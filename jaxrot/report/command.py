@@ -11,14 +11,17 @@ from jaxrot.console.errors import UserError
 from jaxrot.console.extras import check_installed
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.progress import progress
-from jaxrot.report import bench, bench_document, document, guards, records, stability
+from jaxrot.report import bench
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
+from jaxrot.report.drawing.pictures import draw_pictures
+from jaxrot.report.guards import prices
 from jaxrot.report.inputs import dragon_input, read_input, thinned
 from jaxrot.report.measurement import Plan
-from jaxrot.report.page import as_page
-from jaxrot.report.pictures import draw_pictures
 from jaxrot.report.sections import measure, number_of_steps
+from jaxrot.report.stability import cells as stability
+from jaxrot.report.writing import bench_document, document, records
+from jaxrot.report.writing.page import as_page
 
 _DTYPES = {"float32": ("float32",), "float64": ("float64",), "both": ("float32", "float64")}
 _LARGEST_BATCH = 10**7
@@ -85,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
         peers_budget_s=size.peers_budget_s if options.peers else None,
         warm_starts_budget_s=size.warm_starts_budget_s if is_everything else None,
         map_steps=None if options.quick else stability.STEPS,
-        guards_size=guards.Size() if is_everything else None,
+        guards_size=prices.Size() if is_everything else None,
     )
     before = options.compare and read_report(options.compare)
     check_installed(["markdown", "matplotlib"], "report")

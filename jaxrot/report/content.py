@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 from jaxrot.report.comparison import Comparison
 from jaxrot.report.contenders import Beside
-from jaxrot.report.guards import Guards
+from jaxrot.report.guards.prices import Guards
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import Results
-from jaxrot.report.stability import ConditionMap, ScaleMap
+from jaxrot.report.stability.cells import ConditionMap, ScaleMap
 from jaxrot.report.warm_starts import WarmStart
 
 

@@ -12,7 +12,7 @@ from jaxrot.measuring import reference
 from jaxrot.measuring.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
 from jaxrot.measuring.judging import Judged
 from jaxrot.measuring.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
-from jaxrot.report.guards import Size as GuardsSize
+from jaxrot.report.guards.prices import Size as GuardsSize
 
 WHOLE = "whole input"
 

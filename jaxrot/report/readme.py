@@ -16,12 +16,12 @@ import jaxrot
 from jaxrot.measuring.domain import largest_condition
 from jaxrot.measuring.timing import Timing
 from jaxrot.measuring.words import listed, number
-from jaxrot.report import pictures
+from jaxrot.report.drawing import pictures
 from jaxrot.report.findings import largest_batch
-from jaxrot.report.guard_tables import ratio_words
-from jaxrot.report.guards import Time
+from jaxrot.report.guards.prices import Time
+from jaxrot.report.guards.tables import ratio_words
 from jaxrot.report.measurement import WHOLE
-from jaxrot.report.tables import Table, as_markdown
+from jaxrot.report.writing.tables import Table, as_markdown
 
 PICTURES = (
     pictures.METHODS,

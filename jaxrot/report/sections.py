@@ -8,15 +8,15 @@ import numpy as np
 import jaxrot
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
-from jaxrot.report import beside, guards, warm_starts
+from jaxrot.report import beside, warm_starts
 from jaxrot.report.contenders import Beside
-from jaxrot.report.guards import Guards
+from jaxrot.report.drawing.pareto import pareto_front
+from jaxrot.report.drawing.pictures import methods_panel
+from jaxrot.report.guards import prices
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Plan, Results, measure_methods
 from jaxrot.report.measurement import number_of_steps as steps_of_methods
-from jaxrot.report.pareto import pareto_front
-from jaxrot.report.pictures import methods_panel
-from jaxrot.report.stability import ConditionMap, ScaleMap, map_conditions, map_scales
+from jaxrot.report.stability.cells import ConditionMap, ScaleMap, map_conditions, map_scales
 from jaxrot.report.warm_starts import WarmStart, measure_warm_starts
 
 
@@ -28,7 +28,7 @@ class Measured(NamedTuple):
     warm_starts: tuple[WarmStart, ...]
     conditions: tuple[ConditionMap, ...] = ()
     scales: tuple[ScaleMap, ...] = ()
-    guards: Guards | None = None
+    guards: prices.Guards | None = None
 
 
 def number_of_steps(plan: Plan) -> int:
@@ -39,7 +39,7 @@ def number_of_steps(plan: Plan) -> int:
     if plan.warm_starts_budget_s is not None:
         steps += warm_starts.number_of_steps(with_peers=plan.peers_budget_s is not None)
     steps += plan.map_steps is not None
-    return len(plan.dtypes) * steps + (0 if plan.guards_size is None else guards.number_of_steps(_guards_size(plan)))
+    return len(plan.dtypes) * steps + (0 if plan.guards_size is None else prices.number_of_steps(_guards_size(plan)))
 
 
 def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measured:
@@ -83,11 +83,11 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
                 advance=advance,
             )
     peers = None if plan.peers_budget_s is None else Beside(contenders, list(skipped))
-    prices = None if plan.guards_size is None else guards.run_guards(_guards_size(plan), advance)
-    return Measured(results, peers, tuple(starts), tuple(conditions), tuple(scales), prices)
+    guards = None if plan.guards_size is None else prices.run_guards(_guards_size(plan), advance)
+    return Measured(results, peers, tuple(starts), tuple(conditions), tuple(scales), guards)
 
 
-def _guards_size(plan: Plan) -> guards.Size:
+def _guards_size(plan: Plan) -> prices.Size:
     assert plan.guards_size is not None
     return plan.guards_size._replace(dtypes=plan.dtypes)
 

@@ -10,7 +10,7 @@ import jaxrot
 from jaxrot.__main__ import main
 from jaxrot.report import bench
 from jaxrot.report.bench import Goal
-from jaxrot.report.tables import goals_table
+from jaxrot.report.writing.tables import goals_table
 
 FEW = ("higham_newton", "svd", "foam", "quaternion_average")
 

@@ -5,10 +5,10 @@ from jaxrot.measuring import gradient_reference, reference
 from jaxrot.measuring.judging import judge
 from jaxrot.report import beside, peers
 from jaxrot.report.beside import measure_beside, number_of_steps
-from jaxrot.report.beside_tables import contenders_table, sources_table, verdicts
 from jaxrot.report.contenders import Contender
 from jaxrot.report.measurement import WHOLE
 from jaxrot.report.peers.peer import Peer, Source, UnavailableError, make_peer
+from jaxrot.report.writing.beside_tables import contenders_table, sources_table, verdicts
 
 MATRICES = np.random.default_rng(0).standard_normal((40, 3, 3))
 

@@ -2,15 +2,15 @@ import json
 
 import numpy as np
 import pytest
+from jaxrot.report.comparison import compare, read_report
 
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
-from jaxrot.report.beside_tables import compared_sentence, errors_compared_table, times_compared_table
-from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.records import as_json
+from jaxrot.report.writing.beside_tables import compared_sentence, errors_compared_table, times_compared_table
+from jaxrot.report.writing.records import as_json
 
 GIVEN = Input("mine", {"own": np.ones((10, 3, 3))})
 SETS = {"own": 10}

@@ -8,11 +8,12 @@ import pytest
 from jaxrot import STEPS, _refine
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
-from jaxrot.report import guards, step_guards
-from jaxrot.report.guard_tables import guards_table
-from jaxrot.report.guards import Guards, Price, Size, Time, compare_times
-from jaxrot.report.step_starts import FAR, HALF_TURN, NEAR, NEAREST, judge_step, pose
-from jaxrot.report.verdict import NOT_FINITE, Broken, Verdict, broken_families, judge_contract, sample_families
+from jaxrot.report.guards import prices as guards
+from jaxrot.report.guards import steps as step_guards
+from jaxrot.report.guards.prices import Guards, Price, Size, Time, compare_times
+from jaxrot.report.guards.starts import FAR, HALF_TURN, NEAR, NEAREST, judge_step, pose
+from jaxrot.report.guards.tables import guards_table
+from jaxrot.report.guards.verdict import NOT_FINITE, Broken, Verdict, broken_families, judge_contract, sample_families
 from jaxrot.solvers import half_turn
 
 TINY = Size(batch=1, matrices_a_family=3, starts_a_family=1, budget_s=0.0, dtypes=("float32",))

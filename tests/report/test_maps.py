@@ -7,8 +7,9 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from jaxrot.report import figures, maps
-from jaxrot.report.stability import Cells, ConditionMap, Kind, ScaleMap
+from jaxrot.report.drawing import figures
+from jaxrot.report.stability import maps
+from jaxrot.report.stability.cells import Cells, ConditionMap, Kind, ScaleMap
 
 NOT_A_ROTATION, NOT_FINITE, KEPT = (
     to_rgb(color) for color in (figures.NOT_A_ROTATION, figures.NOT_FINITE, figures.KEPT)

@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from jaxrot.report.labels import place_labels
-from jaxrot.report.pareto import EXACT, PEER, Panel, Point, draw_pareto, pareto_front
+from jaxrot.report.drawing.labels import place_labels
+from jaxrot.report.drawing.pareto import EXACT, PEER, Panel, Point, draw_pareto, pareto_front
 
 
 def point(name, time, error):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from jaxrot.__main__ import main
-from jaxrot.report import command, document, measurement, records, sections
+from jaxrot.report import command, measurement, sections
+from jaxrot.report.writing import document, records
 
 
 def _save_text(path):

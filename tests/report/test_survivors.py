@@ -10,8 +10,8 @@ from matplotlib.image import imread
 import jaxrot
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.report import figures
-from jaxrot.report.survivors import CASES, Grade, draw_survival, grade, survivors_table
+from jaxrot.report.drawing import figures
+from jaxrot.report.stability.survivors import CASES, Grade, draw_survival, grade, survivors_table
 
 NAMES = list(jaxrot.METHODS)
 

@@ -5,8 +5,8 @@ import jaxrot
 from jaxrot.measuring import reference
 from jaxrot.measuring.judging import judge
 from jaxrot.report import warm_starts
-from jaxrot.report.beside_tables import warm_starts_table
 from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, measure_warm_starts, number_of_steps
+from jaxrot.report.writing.beside_tables import warm_starts_table
 
 
 @pytest.fixture(scope="module")

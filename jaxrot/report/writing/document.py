@@ -3,8 +3,14 @@
 from collections.abc import Mapping
 
 import jaxrot
-from jaxrot.report import pictures as picture_names
-from jaxrot.report.beside_tables import (
+from jaxrot.report.content import Content
+from jaxrot.report.drawing import pictures as picture_names
+from jaxrot.report.findings import faster_outside, findings, on_input, warm_starts_finding
+from jaxrot.report.guards.tables import GUARDS_CAPTION, guards_table
+from jaxrot.report.stability.maps import CONDITIONS_CAPTION, SCALES_CAPTION
+from jaxrot.report.stability.survivors import SURVIVORS_CAPTION, survivors_table
+from jaxrot.report.warm_starts import ANGLE_DEGREES
+from jaxrot.report.writing.beside_tables import (
     compared_sentence,
     contenders_table,
     errors_compared_table,
@@ -13,13 +19,15 @@ from jaxrot.report.beside_tables import (
     verdicts,
     warm_starts_table,
 )
-from jaxrot.report.content import Content
-from jaxrot.report.findings import faster_outside, findings, on_input, warm_starts_finding
-from jaxrot.report.guard_tables import GUARDS_CAPTION, guards_table
-from jaxrot.report.maps import CONDITIONS_CAPTION, SCALES_CAPTION
-from jaxrot.report.survivors import SURVIVORS_CAPTION, survivors_table
-from jaxrot.report.tables import Table, accuracy_table, as_markdown, as_text, sets_table, summary_table, timing_table
-from jaxrot.report.warm_starts import ANGLE_DEGREES
+from jaxrot.report.writing.tables import (
+    Table,
+    accuracy_table,
+    as_markdown,
+    as_text,
+    sets_table,
+    summary_table,
+    timing_table,
+)
 
 _CONTRACT = """\
 The **contract**, for a finite matrix with singular values s1 ≥ s2 ≥ |s3|, κ = s1/(s2+s3), R* its nearest rotation:

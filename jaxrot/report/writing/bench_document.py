@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from jaxrot.report.bench import Bench
-from jaxrot.report.document import columns, header
-from jaxrot.report.tables import as_markdown, as_text, goals_table
+from jaxrot.report.writing.document import columns, header
+from jaxrot.report.writing.tables import as_markdown, as_text, goals_table
 
 _BENCH = """\
 Gaussian matrices, float32 where not said otherwise. Ratios of times are medians and quartiles over rounds in which

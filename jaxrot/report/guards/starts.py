@@ -11,7 +11,7 @@ from jaxrot import _mat3, _quaternion
 from jaxrot.families import half_turn_starts
 from jaxrot.measuring import domain
 from jaxrot.measuring.judging import Judged, judge
-from jaxrot.report.verdict import Verdict, judge_contract
+from jaxrot.report.guards.verdict import Verdict, judge_contract
 
 # A warm start 45° off, one 135° off, one at the nearest rotation, and one exactly half a turn off, which stands still.
 NEAR, FAR, NEAREST, HALF_TURN = range(4)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jaxrot.report.figures import as_png, new_figure
+from jaxrot.report.drawing.figures import as_png, new_figure
 from jaxrot.report.warm_starts import ANGLE_DEGREES, COLD_START, PAPER, WarmStart
 
 # Okabe and Ito's colours; the marker tells the lines apart in grey.

@@ -10,9 +10,9 @@ import jaxrot
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.words import listed
-from jaxrot.report.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
-from jaxrot.report.stability import ROTATION_TOLERANCE
-from jaxrot.report.tables import Table
+from jaxrot.report.drawing.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
+from jaxrot.report.stability.cells import ROTATION_TOLERANCE
+from jaxrot.report.writing.tables import Table
 
 # What a usable rotation may lose of the trace, as a multiple of s1. It grows with the square of the angle between R and
 # R*: near a rotation it allows for six degrees.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from jaxrot.measuring.words import number
 from jaxrot.report.comparison import Comparison
 from jaxrot.report.contenders import Contender, Quantiles, Spread, beyond_front
-from jaxrot.report.tables import Table
 from jaxrot.report.warm_starts import WarmStart
+from jaxrot.report.writing.tables import Table
 
 
 def contenders_table(contenders: Sequence[Contender], dtype: str) -> Table:

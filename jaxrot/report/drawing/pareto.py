@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxrot.report.figures import as_png, new_figure
-from jaxrot.report.labels import place_labels
+from jaxrot.report.drawing.figures import as_png, new_figure
+from jaxrot.report.drawing.labels import place_labels
 
 # Okabe and Ito's colours, told apart without seeing red or green; shape and filling tell the kinds apart in grey too.
 EXACT, APPROXIMATION, PEER = "exact method", "approximation", "another package"

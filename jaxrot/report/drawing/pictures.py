@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 import jaxrot
 from jaxrot.report.contenders import Contender, Quantiles, Spread, beyond_front
 from jaxrot.report.content import Content
+from jaxrot.report.drawing.pareto import APPROXIMATION, EXACT, PEER, Panel, Point, draw_pareto
+from jaxrot.report.drawing.warm_starts import draw_warm_starts
 from jaxrot.report.findings import on_input, times_at_largest_batch
-from jaxrot.report.maps import draw_condition_maps, draw_scale_map, sorted_methods
 from jaxrot.report.measurement import Results
-from jaxrot.report.pareto import APPROXIMATION, EXACT, PEER, Panel, Point, draw_pareto
-from jaxrot.report.survivors import draw_survival
-from jaxrot.report.warm_picture import draw_warm_starts
+from jaxrot.report.stability.maps import draw_condition_maps, draw_scale_map, sorted_methods
+from jaxrot.report.stability.survivors import draw_survival
 
 METHODS, PEERS, GRADIENTS, WARM_STARTS = "pareto.png", "peers.png", "gradients.png", "warm_starts.png"
 SCALES, SURVIVAL = "stability_scales.png", "survival.png"

@@ -13,9 +13,9 @@ import jaxrot
 from jaxrot import STEPS
 from jaxrot.measuring.judging import judge
 from jaxrot.measuring.timing import interleave
-from jaxrot.report import step_guards
-from jaxrot.report.step_starts import HALF_TURN, ITERATIONS, Posed, judge_step, pose
-from jaxrot.report.verdict import Broken, Verdict, broken_families, judge_contract, sample_families
+from jaxrot.report.guards import steps as step_guards
+from jaxrot.report.guards.starts import HALF_TURN, ITERATIONS, Posed, judge_step, pose
+from jaxrot.report.guards.verdict import Broken, Verdict, broken_families, judge_contract, sample_families
 from jaxrot.solvers import half_turn
 
 # Of equal times three in four of that many rounds agree by chance once in 80 times, of 12 rounds once in 7.

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxrot.report.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
-from jaxrot.report.stability import Cells, ConditionMap, Kind, ScaleMap, summarise_conditions
+from jaxrot.report.drawing.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
+from jaxrot.report.stability.cells import Cells, ConditionMap, Kind, ScaleMap, summarise_conditions
 
 CONDITIONS_CAPTION = """\
 Each map is the region |s3| ≤ s2 ≤ s1 = 1 of the signed singular values: its upper corner holds the rotations, its

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from jaxrot.measuring.words import number
-from jaxrot.report.guards import Price, Time
-from jaxrot.report.tables import Table
-from jaxrot.report.verdict import Broken
+from jaxrot.report.guards.prices import Price, Time
+from jaxrot.report.guards.verdict import Broken
+from jaxrot.report.writing.tables import Table
 
 GUARDS_CAPTION = """\
 One guard left out at a time. The time is the ratio without over with it in the same rounds, for 100,000 Gaussian

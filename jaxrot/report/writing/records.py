@@ -13,7 +13,7 @@ from jaxrot.report.bench import Bench
 from jaxrot.report.content import Content
 from jaxrot.report.findings import findings
 from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.stability import summarise_conditions, summarise_scales
+from jaxrot.report.stability.cells import summarise_conditions, summarise_scales
 
 
 def as_json(content: Content) -> str:

@@ -1,0 +1,1 @@
+"""What every guard of the default method and of the steps costs and prevents."""

@@ -1,0 +1,1 @@
+"""The report as text, tables, a page and records."""
