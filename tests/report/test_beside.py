@@ -119,6 +119,7 @@ def test_a_peer_beyond_the_front_is_said(measured):
     assert any("better in float32 lies beyond" in words for words in verdicts([*measured.contenders, better]))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", peers.PEERS)
 def test_every_peer_that_is_here_finds_the_nearest_rotation(name):
     for dtype in ("float32", "float64"):

@@ -45,6 +45,7 @@ def names(price):
     return {entry.family for entry in price.broken}
 
 
+@pytest.mark.exhaustive
 def test_the_default_with_nothing_left_out_breaks_nothing(default):
     assert list(default) == ["", "inversion", "renormalisation"]
     assert default[""].broken == ()
@@ -52,6 +53,7 @@ def test_the_default_with_nothing_left_out_breaks_nothing(default):
     assert default[""].gained == 0
 
 
+@pytest.mark.exhaustive
 def test_without_inversion_the_inverted_families_break_and_no_other(default):
     price = default["inversion"]
     assert {"minus_rotation_1e-1", "near_tie", "equal_large"} <= names(price)
@@ -64,12 +66,14 @@ def test_without_inversion_the_inverted_families_break_and_no_other(default):
     assert price.not_finite == 0
 
 
+@pytest.mark.exhaustive
 def test_without_renormalisation_the_default_breaks_nothing_and_the_table_says_so(default):
     assert default["renormalisation"].broken == ()
     row = guards_table([default["renormalisation"]], "title").rows[0]
     assert row[-1] == "none"
 
 
+@pytest.mark.exhaustive
 def test_a_ratio_is_that_of_the_times_it_names(default, step):
     # As many are timed as are judged, where those are more than the batch.
     matrices = default["inversion"].judged
@@ -92,12 +96,14 @@ def test_programs_are_timed_side_by_side_for_the_fewest_rounds_at_least():
     assert np.median(seconds["fast"]) < np.median(seconds["slow"])
 
 
+@pytest.mark.exhaustive
 def test_without_escape_the_half_turn_starts_break(step):
     assert {"identity", "half_turn", "swap"} <= names(step["escape"])
     assert not {"zero", NOT_FINITE} & names(step["escape"])
     assert step["escape"].judged * 3 == step[""].judged
 
 
+@pytest.mark.exhaustive
 def test_without_renormalisation_a_step_is_left_with_a_quaternion_of_another_length(step):
     broken = {entry.family: entry for entry in step["renormalisation"].broken}
     assert broken["rotation"].promise == "length"
@@ -105,6 +111,7 @@ def test_without_renormalisation_a_step_is_left_with_a_quaternion_of_another_len
     assert "zero" not in broken
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", STEPS)
 @pytest.mark.parametrize("escape", [False, True])
 def test_a_step_with_all_guards_is_the_librarys_own_program(name, escape):
@@ -117,6 +124,7 @@ def test_a_step_with_all_guards_is_the_librarys_own_program(name, escape):
     assert jax.jit(composed).lower(matrix, quaternion).as_text() == jax.jit(advance).lower(matrix, quaternion).as_text()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("name", "guard"), [(name, guard) for name in STEPS for guard in step_guards.GUARDS[name]])
 def test_what_is_left_out_is_not_in_the_program(name, guard):
     matrix, quaternion = np.zeros((2, 3, 3), np.float32), np.ones((2, 4), np.float32)

@@ -31,6 +31,7 @@ def test_starts_are_the_angle_off(judged):
     np.testing.assert_allclose(np.rad2deg(np.arccos(cosine.astype(float))), ANGLE_DEGREES, rtol=1e-9)
 
 
+@pytest.mark.exhaustive
 def test_errors_are_those_of_the_iterations(judged, measured):
     assert measured[COLD_START, 0].error.largest < 1e-13
     assert measured["newton", 4].error.largest < 1e-12
@@ -40,6 +41,7 @@ def test_errors_are_those_of_the_iterations(judged, measured):
     assert all(0 < entry.time.quartile_1 <= entry.time.median for entry in measured.values())
 
 
+@pytest.mark.exhaustive
 def test_the_papers_own_code_takes_the_same_steps(measured):
     if (PAPER, 1) not in measured:
         pytest.skip("no compiler or no Eigen")
@@ -48,6 +50,7 @@ def test_the_papers_own_code_takes_the_same_steps(measured):
         np.testing.assert_allclose(paper, own, rtol=1e-6)
 
 
+@pytest.mark.exhaustive
 def test_the_table_has_a_row_for_each(measured):
     table = warm_starts_table(list(measured.values()), "float64")
     assert len(table.rows) == len(measured)
