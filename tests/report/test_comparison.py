@@ -2,10 +2,10 @@ import json
 
 import numpy as np
 import pytest
-from jaxrot.report.comparison import compare, read_report
 
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
+from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Results

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-from jaxrot.report.findings import faster_outside, findings, largest_batch
 
 import jaxrot
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
 from jaxrot.report.contenders import Beside, Contender, Quantiles, Spread, beyond_front
 from jaxrot.report.content import Content
+from jaxrot.report.findings import faster_outside, findings, largest_batch
 from jaxrot.report.inputs import Input
 from jaxrot.report.measurement import WHOLE, Results
 from jaxrot.report.warm_starts import COLD_START, WarmStart
