@@ -29,7 +29,7 @@ class TimeChange(NamedTuple):
         ratio: now / before; above 1 it takes longer.
         relative: The ratio over the median of all ratios, which is what the machine itself contributes.
         verdict: "slower" or "faster" where the quartiles of both runs stand apart, also when the machine's share is
-            taken out; else "".
+            taken out, and the ratio stands out from those of the other methods at that batch size; else "".
     """
 
     method: str
@@ -141,6 +141,8 @@ def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[float, tupl
     pairs = [(earlier[key], entry) for entry in now if (key := (entry.method, entry.dtype, entry.batch)) in earlier]
     ratios = [new.median_ns / old.median_ns for old, new in pairs]
     machine = float(np.median(ratios)) if len(ratios) >= _FEWEST_FOR_MACHINE else 1.0
+    batches = {new.batch for _, new in pairs}
+    usual = {batch: _usual([n.median_ns / o.median_ns for o, n in pairs if n.batch == batch]) for batch in batches}
     return machine, tuple(
         TimeChange(
             method=new.method,
@@ -150,13 +152,28 @@ def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[float, tupl
             now_ns=new.median_ns,
             ratio=new.median_ns / old.median_ns,
             relative=new.median_ns / old.median_ns / machine,
-            verdict=_verdict(old, new, machine),
+            verdict=_verdict(old, new, machine, usual[new.batch]),
         )
         for old, new in pairs
     )
 
 
-def _verdict(old: Timing, new: Timing, machine: float) -> str:
+def _usual(ratios: Sequence[float]) -> tuple[float, float]:
+    """Between which ratios a method does not stand out: one and a half times the interquartile range beyond either end.
+
+    Times differ more from run to run than within one: of 126 ratios of the same code 35 had their quartiles apart, and
+    3 of these stand out.
+    """
+    if len(ratios) < _FEWEST_FOR_MACHINE:
+        return 1.0, 1.0
+    first, third = np.quantile(np.log(ratios), [0.25, 0.75])
+    reach = 1.5 * (third - first)
+    return float(np.exp(first - reach)), float(np.exp(third + reach))
+
+
+def _verdict(old: Timing, new: Timing, machine: float, usual: tuple[float, float]) -> str:
+    if usual[0] <= new.median_ns / old.median_ns <= usual[1]:
+        return ""
     if all(new.quartile_1_ns / share > old.quartile_3_ns for share in (1.0, machine)):
         return "slower"
     if all(new.quartile_3_ns / share < old.quartile_1_ns for share in (1.0, machine)):

@@ -40,6 +40,7 @@ def verdicts(changes):
 
 
 FOUR = [("foam", 100), ("svd", 1000), ("taylor", 50), ("cayley", 60)]
+REST = [(method, 100) for method in ("squaring", "irving", "torque", "davenport", "half_turn", "horn_quartic")]
 RIGHT = [(method, 1e-7) for method, _ in FOUR]
 
 
@@ -48,13 +49,30 @@ def with_foam(*error):
 
 
 def test_only_what_stands_apart_is_called_slower(tmp_path):
-    before = written(results(FOUR, RIGHT), tmp_path)
-    now = results([("foam", 150), ("svd", 1050), ("taylor", 50), ("cayley", 30)], RIGHT)
+    right = [(method, 1e-7) for method, _ in FOUR + REST]
+    before = written(results(FOUR + REST, right), tmp_path)
+    now = results([("foam", 150), ("svd", 1050), ("taylor", 50), ("cayley", 30), *REST], right)
     comparison = compare("old.json", before, now, SETS)
-    assert verdicts(comparison.times) == {"foam": "slower", "svd": "", "taylor": "", "cayley": "faster"}
+    said = verdicts(comparison.times)
+    assert {method: said[method] for method, _ in FOUR} == {
+        "foam": "slower",
+        "svd": "",
+        "taylor": "",
+        "cayley": "faster",
+    }
     assert "slower: foam (float32, batch 100: 1.50); faster: 1; less accurate: none" in compared_sentence(comparison)
     first = times_compared_table(comparison).rows[0]
     assert (first[0], first[5], first[-1]) == ("foam", "1.5", "**slower**")
+
+
+def test_what_differs_as_much_as_all_the_others_do_is_not_called_slower(tmp_path):
+    right = [(method, 1e-7) for method, _ in REST]
+    before = written(results(REST, right), tmp_path)
+    now = [
+        (method, median * ratio) for (method, median), ratio in zip(REST, (0.7, 0.85, 1, 1.1, 1.2, 1.4), strict=True)
+    ]
+    comparison = compare("old.json", before, results(now, right), SETS)
+    assert set(verdicts(comparison.times).values()) == {""}
 
 
 def test_a_slower_machine_makes_nobody_slower(tmp_path):

@@ -71,8 +71,9 @@ together."""
 
 _COMPARED = """\
 A method is called slower or faster only where the quartiles of the two runs stand apart, as they are and with the
-machine's share, the median of all ratios, taken out; worse where more matrices are outside the contract or the error
-grew by more than a twentieth."""
+machine's share, the median of all ratios, taken out, and where its ratio stands out from those of the other methods at
+that batch size, by one and a half times their interquartile range; worse where more matrices are outside the contract
+or the error grew by more than a twentieth."""
 
 
 def as_report_markdown(content: Content, pictures: Mapping[str, bytes]) -> str:
