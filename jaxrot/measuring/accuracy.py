@@ -67,6 +67,16 @@ class Errors(NamedTuple):
     torque: np.ndarray
     is_outside: np.ndarray
 
+    @property
+    def over_bounds(self) -> dict[str, np.ndarray]:
+        """Each error as a multiple of what the contract allows, by the name of what it bounds."""
+        return {
+            "rotation": self.forward_units / domain.FORWARD_BOUND,
+            "orthogonality": self.orthogonality / domain.ORTHOGONALITY_BOUND,
+            "trace": self.lost_trace / domain.LOST_TRACE_BOUND,
+            "torque": self.torque / domain.TORQUE_BOUND,
+        }
+
 
 def run_in_chunks(call: Callable[..., np.ndarray], matrices: np.ndarray, chunk: int, *starts: np.ndarray) -> np.ndarray:
     """Applies a function compiled for one batch size to any number of matrices; the last chunk is filled up.

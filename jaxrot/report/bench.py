@@ -9,6 +9,7 @@ import numpy as np
 
 import jaxrot
 from jaxrot.measuring.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
+from jaxrot.report.measurement import method_function
 
 
 class Size(NamedTuple):
@@ -80,10 +81,6 @@ def _with_pullback(matrix: jax.Array) -> tuple[jax.Array, jax.Array]:
     return rotation, pullback(matrix)[0]
 
 
-def _method(name: str) -> Callable[[jax.Array], jax.Array]:
-    return lambda matrix: jaxrot.nearest_rotation(matrix, method=name)
-
-
 def _newton(matrix: jax.Array, rotation: jax.Array) -> jax.Array:
     return jaxrot.refine_rotation(matrix, rotation, step="newton", iterations=1)
 
@@ -120,9 +117,9 @@ def _middle(bench: Bench, size: Size) -> None:
     warm = jaxrot.nearest_rotation(a + 0.05)
     functions = {
         "default": (jaxrot.nearest_rotation, (a,)),
-        "svd": (_method("svd"), (a,)),
+        "svd": (method_function("svd"), (a,)),
         "newton step": (_newton, (a, warm)),
-        "quaternion_average": (_method("quaternion_average"), (a,)),
+        "quaternion_average": (method_function("quaternion_average"), (a,)),
         "value and VJP": (_with_pullback, (a,)),
         "default, float64": (jaxrot.nearest_rotation, (wide,)),
     }
@@ -140,11 +137,11 @@ def _large(bench: Bench, size: Size) -> None:
     warm = jaxrot.in_blocks(jaxrot.nearest_rotation)(a + 0.05)
     functions = {
         "copy": (_copy, (a,)),
-        "svd": (_method("svd"), (a,)),
+        "svd": (method_function("svd"), (a,)),
         "default at once": (jaxrot.nearest_rotation, (a,)),
         "default in blocks": (jaxrot.in_blocks(jaxrot.nearest_rotation), (a,)),
         "newton step in blocks": (jaxrot.in_blocks(_newton), (a, warm)),
-        "quaternion_average in blocks": (jaxrot.in_blocks(_method("quaternion_average")), (a,)),
+        "quaternion_average in blocks": (jaxrot.in_blocks(method_function("quaternion_average")), (a,)),
     }
     t = _time(bench, functions, size)
     _add(bench, "svd over default in blocks", batch, t["svd"] / t["default in blocks"], 20, at_least=True)
@@ -172,7 +169,9 @@ def _small(bench: Bench, size: Size) -> None:
     for batch in (1, size.small):
         a = _gaussian(batch)
         # A sample is one call: among many in a row a few wait for a thread for as long as all the others take.
-        t = _time(bench, {name: (_method(name), (a,)) for name in exact}, size, shortest_sample_s=0.0, most_rounds=500)
+        t = _time(
+            bench, {name: (method_function(name), (a,)) for name in exact}, size, shortest_sample_s=0.0, most_rounds=500
+        )
         fastest = min(set(exact) - {jaxrot.DEFAULT_METHOD}, key=lambda name: np.median(t[name]))
         ratio = t[jaxrot.DEFAULT_METHOD] / t[fastest]
         _add(bench, f"default over {fastest}, the fastest other exact method", batch, ratio, 1.3)
@@ -180,7 +179,9 @@ def _small(bench: Bench, size: Size) -> None:
 
 def _compile_times(bench: Bench, size: Size) -> None:
     compile_method(_copy, 1, "float32")  # the first compilation of a process pays for everybody's
-    seconds = {name: compile_method(_method(name), size.middle + 1, "float32").compile_s for name in jaxrot.METHODS}
+    seconds = {
+        name: compile_method(method_function(name), size.middle + 1, "float32").compile_s for name in jaxrot.METHODS
+    }
     slowest = max(seconds, key=lambda name: seconds[name])
     for name in dict.fromkeys((jaxrot.DEFAULT_METHOD, slowest)):
         _add(bench, f"seconds to compile {name}", size.middle + 1, np.array(seconds[name]), 1.5)

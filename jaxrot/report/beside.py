@@ -12,6 +12,7 @@ from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
 from jaxrot.measuring.judging import Judged
 from jaxrot.measuring.timing import fill_batch, interleave
 from jaxrot.report.contenders import Beside, Contender, Quantiles, quantiles, spread
+from jaxrot.report.measurement import method_function
 from jaxrot.report.peers import PEERS
 from jaxrot.report.peers.jax_linalg import in_jax
 from jaxrot.report.peers.peer import Peer, UnavailableError, make_peer
@@ -40,7 +41,7 @@ def measure_beside(
     ready: dict[str, tuple[Peer, str, int]] = {}
     skipped = []
     for name in methods:
-        ready[name] = (in_jax(_method(name), dtype), "jaxrot", batch)
+        ready[name] = (in_jax(method_function(name), dtype), "jaxrot", batch)
     if dtype == "float32":
         ready[f"{jaxrot.DEFAULT_METHOD} in float64"] = (
             in_jax(_in_float64, dtype)._replace(computes_in="float64"),
@@ -78,10 +79,6 @@ def measure_beside(
 def number_of_steps(methods: Sequence[str]) -> int:
     """How often `measure_beside` calls `advance`."""
     return len(methods) + 1 + len(PEERS) + 1
-
-
-def _method(name: str) -> Callable[[jax.Array], jax.Array]:
-    return lambda matrix: jaxrot.nearest_rotation(matrix, method=name)
 
 
 def _in_float64(matrix: jax.Array) -> jax.Array:

@@ -8,6 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from jaxrot.console.errors import UserError
+from jaxrot.families import FAMILIES
 from jaxrot.report import deformed_dragon
 
 EXPECTED = "expected a .npy or .npz file with a real array of shape (..., 3, 3)"
@@ -36,6 +37,11 @@ def dragon_input(cluster_count: int) -> Input:
         " deformations of the dragon (source: Stanford University Computer Graphics Laboratory)."
     )
     return Input(deformed_dragon.NAME, deformed_dragon.dragon_matrices(cluster_count), (remark,))
+
+
+def family_matrices(count: int, dtype: str) -> dict[str, np.ndarray]:
+    """`count` matrices of every family, the same every time."""
+    return {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}
 
 
 def read_input(path: Path, option: str = "--input") -> Input:

@@ -96,7 +96,7 @@ def measure_methods(
         compiled[batch] = {}
         for name in plan.methods:
             advance(f"{dtype}: compiling {name} for batch {batch:,}")
-            compiled[batch][name] = compile_method(_function(name), batch, dtype)
+            compiled[batch][name] = compile_method(method_function(name), batch, dtype)
 
     def time_all(batch: int, budget_s: float) -> None:
         advance(f"{dtype}: timing batch {batch:,}")
@@ -146,5 +146,6 @@ def _cost_of_chunks(total: int, batch: int) -> int:
     return -(-total // batch) * (batch + 1000)
 
 
-def _function(name: str) -> Callable[[jax.Array], jax.Array]:
+def method_function(name: str) -> Callable[[jax.Array], jax.Array]:
+    """`nearest_rotation` by a method."""
     return lambda matrix: jaxrot.nearest_rotation(matrix, method=name)

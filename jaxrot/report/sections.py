@@ -3,17 +3,14 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-
 import jaxrot
-from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
 from jaxrot.report import beside, warm_starts
 from jaxrot.report.contenders import Beside
 from jaxrot.report.drawing.pareto import pareto_front
 from jaxrot.report.drawing.pictures import methods_panel
 from jaxrot.report.guards import prices
-from jaxrot.report.inputs import Input
+from jaxrot.report.inputs import Input, family_matrices
 from jaxrot.report.measurement import WHOLE, Plan, Results, measure_methods
 from jaxrot.report.measurement import number_of_steps as steps_of_methods
 from jaxrot.report.stability.cells import ConditionMap, ScaleMap, map_conditions, map_scales
@@ -56,7 +53,7 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
         advance(f"{dtype}: the reference")
         judged = {
             "input": judge(given.sets, dtype, whole=WHOLE),
-            "families": judge(_families(plan.matrices_a_family, dtype), dtype),
+            "families": judge(family_matrices(plan.matrices_a_family, dtype), dtype),
         }
         found, run = measure_methods(plan, judged, advance)
         results = Results(
@@ -90,7 +87,3 @@ def measure(plan: Plan, given: Input, advance: Callable[[str], object]) -> Measu
 def _guards_size(plan: Plan) -> prices.Size:
     assert plan.guards_size is not None
     return plan.guards_size._replace(dtypes=plan.dtypes)
-
-
-def _families(count: int, dtype: str) -> dict[str, np.ndarray]:
-    return {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot.families import FAMILIES, poison
-from jaxrot.measuring import domain
 from jaxrot.measuring.accuracy import measure_errors
 from jaxrot.measuring.judging import Judged
+from jaxrot.report.inputs import family_matrices
 
 # A set of its own beside `FAMILIES`; the promise there is NaN, and nothing but NaN.
 NOT_FINITE = "not finite"
@@ -57,9 +57,10 @@ class Broken(NamedTuple):
 
 def sample_families(count: int, dtype: str) -> dict[str, np.ndarray]:
     """`count` matrices of every family, and matrices that are not finite."""
-    sets = {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}
     # Every third is poisoned.
-    return sets | {NOT_FINITE: poison(FAMILIES["gaussian"].sample(3 * count, dtype=np.dtype(dtype)).matrices)[::3]}
+    return family_matrices(count, dtype) | {
+        NOT_FINITE: poison(FAMILIES["gaussian"].sample(3 * count, dtype=np.dtype(dtype)).matrices)[::3]
+    }
 
 
 def judge_contract(rotation: np.ndarray, judged: Judged) -> Verdict:
@@ -68,13 +69,7 @@ def judge_contract(rotation: np.ndarray, judged: Judged) -> Verdict:
     A rotation that is not finite is infinitely wrong; so is a number in the place of NaN.
     """
     errors = measure_errors(rotation, judged)
-    ratios = {
-        "rotation": errors.forward_units / domain.FORWARD_BOUND,
-        "orthogonality": errors.orthogonality / domain.ORTHOGONALITY_BOUND,
-        "trace": errors.lost_trace / domain.LOST_TRACE_BOUND,
-        "torque": errors.torque / domain.TORQUE_BOUND,
-        "NaN": np.where(errors.is_outside & ~judged.is_finite, np.inf, 0.0),
-    }
+    ratios = errors.over_bounds | {"NaN": np.where(errors.is_outside & ~judged.is_finite, np.inf, 0.0)}
     # NaN among the errors: not defined for this matrix.
     over_bound = {name: np.where(np.isnan(ratio), 0.0, ratio) for name, ratio in ratios.items()}
     return Verdict(over_bound, np.asarray(np.isfinite(rotation).all(axis=(1, 2))))

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot.families import Family
-from jaxrot.measuring import domain
 from jaxrot.measuring.accuracy import Errors, measure_errors
 from jaxrot.measuring.judging import judge
 
@@ -207,13 +206,7 @@ def _judge_cells(
 
 
 def _excess(errors: Errors) -> np.ndarray:
-    multiples = [
-        errors.forward_units / domain.FORWARD_BOUND,
-        errors.orthogonality / domain.ORTHOGONALITY_BOUND,
-        errors.lost_trace / domain.LOST_TRACE_BOUND,
-        errors.torque / domain.TORQUE_BOUND,
-    ]
-    return np.fmax.reduce(multiples)
+    return np.fmax.reduce(list(errors.over_bounds.values()))
 
 
 def _kind(errors: Errors, eps: float) -> np.ndarray:
