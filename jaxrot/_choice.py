@@ -30,6 +30,21 @@ def is_positive(x: jax.Array) -> jax.Array:
     return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
 
 
+def constant_like(x: jax.Array, value: float) -> jax.Array:
+    """An array of one value that is batched and sharded as x is, also inside `vmap`; NaN where x is.
+
+    `jnp.full_like` is not batched inside `vmap`. A choice between two such constants, a stack of them or a loop that
+    starts from one fails on a mesh with Explicit axes on jax 0.10.
+    """
+    constant = x.dtype.type(value)
+    return lax.clamp(constant, lax.stop_gradient(x), constant)
+
+
+def sign_of(x: jax.Array) -> jax.Array:
+    """−1 where x < 0, +1 elsewhere: sign(0) counts as +1."""
+    return 1 - 2 * (x < 0).astype(x.dtype)
+
+
 def exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
     """(b, a) where the condition holds, (a, b) elsewhere."""
     return jnp.where(condition, b, a), jnp.where(condition, a, b)
@@ -37,7 +52,9 @@ def exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Arra
 
 def index_of_largest(values: tuple[jax.Array, ...]) -> jax.Array:
     """The index of the largest value, the first of equal ones, as a floating-point number."""
-    best, index = values[0], jnp.zeros_like(values[0])
+    # The derivative of a maximum is such a choice between constants; an index has none.
+    values = lax.stop_gradient(values)
+    best, index = values[0], constant_like(values[0], 0)
     for i, value in enumerate(values[1:], start=1):
         index = jnp.where(value > best, jnp.full_like(index, i), index)
         best = jnp.maximum(best, value)

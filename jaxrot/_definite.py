@@ -7,7 +7,7 @@ unknowns end in quotients: what is rounding in one of them is then the same roun
 import jax
 import jax.numpy as jnp
 
-from jaxrot._choice import choose, computed_once, index_of_largest
+from jaxrot._choice import choose, computed_once, constant_like, index_of_largest
 from jaxrot._mat3 import Mat3, Vec3
 
 # A minor below 16 eps tr(h)² is rounding. Where two eigenvalues are below it the choice is left to the third one.
@@ -59,7 +59,7 @@ def null_vector(h: Mat3) -> Vec3:
     factor = hij / hii
     nj = (factor * hki - hkj) / _away_from_zero(hjj - factor * hij, 2 * eps * size)
     ni = -(hki + hij * nj) / hii
-    one = jnp.ones_like(ni)
+    one = constant_like(ni, 1)
     return choose(k, one, nj, ni), choose(k, ni, one, nj), choose(k, nj, ni, one)
 
 

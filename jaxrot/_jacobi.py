@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
+from jaxrot._choice import constant_like, sign_of
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_divide, safe_sqrt
 
@@ -104,7 +105,7 @@ def symmetric_eigen(m: Mat3) -> tuple[Vec3, Mat3]:
         xz, yz = rotate(rotation, xz, yz)
         return (xx + t * xy, yy - t * xy, zz), (yz, xz, zero), rotate_rows(rotation, axes, 0, 1)
 
-    zero = jnp.zeros_like(m[0][0])
+    zero = constant_like(m[0][0], 0)
     negligible = float(jnp.finfo(zero.dtype).eps) / 4 * jnp.abs(_mat3.trace(m))
     start = ((m[0][0], m[1][1], m[2][2]), (m[1][2], m[0][2], m[0][1]), _mat3.identity_like(m))
     values, _, axes = lax.fori_loop(0, _EIGEN_ROTATIONS, step, start)
@@ -134,7 +135,7 @@ def ordered_svd(left: Mat3, diagonal: Vec3, right: Mat3) -> tuple[Mat3, Vec3, Ma
             opposite = _mat3.scale_vector(axes[i], -1.0)
             axes[i], axes[j] = _mat3.where(is_smaller, axes[j], axes[i]), _mat3.where(is_smaller, opposite, axes[j])
     for i in (0, 1):
-        sign = jnp.where(d[i] < 0, -jnp.ones_like(d[i]), jnp.ones_like(d[i]))
+        sign = sign_of(d[i])
         d[i], d[2] = d[i] * sign, d[2] * sign
         u[i], u[2] = _mat3.scale_vector(u[i], sign), _mat3.scale_vector(u[2], sign)
     return _mat3.transpose((u[0], u[1], u[2])), (d[0], d[1], d[2]), _mat3.transpose((v[0], v[1], v[2]))

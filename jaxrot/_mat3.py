@@ -4,10 +4,13 @@ Written out on components, XLA fuses the whole algorithm into few passes over me
 do not fuse, and an accelerator may compute them in TF32 or bfloat16.
 """
 
+import functools
 from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
+
+from jaxrot._choice import constant_like
 
 # notation: a matrix is a tuple of rows, each a tuple of three arrays of one batch shape; a vector is such a row.
 Vec3 = tuple[jax.Array, jax.Array, jax.Array]
@@ -131,13 +134,9 @@ def skew(v: Vec3) -> Mat3:
     return ((zero, -z, y), (z, zero, -x), (-y, x, zero))
 
 
-def largest_entry(m: Mat3) -> jax.Array:
-    """The largest absolute value of an entry; NaN where the matrix holds one."""
-    largest = jnp.abs(m[0][0])
-    for row in m:
-        for entry in row:
-            largest = jnp.maximum(largest, jnp.abs(entry))
-    return largest
+def largest_entry(m: object) -> jax.Array:
+    """The largest absolute value of an entry; NaN where there is one."""
+    return functools.reduce(jnp.maximum, map(jnp.abs, jax.tree.leaves(m)))
 
 
 def gap_matrix(b: Mat3) -> Mat3:
@@ -172,6 +171,5 @@ def where(condition: jax.Array, a: _Tree, b: _Tree) -> _Tree:
 
 def identity_like(m: Mat3) -> Mat3:
     """The identity for each matrix of the batch, carrying the batch's sharding."""
-    zero = jnp.zeros_like(m[0][0])
-    one = jnp.ones_like(m[0][0])
+    zero, one = constant_like(m[0][0], 0), constant_like(m[0][0], 1)
     return ((one, zero, zero), (zero, one, zero), (zero, zero, one))

@@ -53,9 +53,7 @@ def add(p: Quaternion, q: Quaternion) -> Quaternion:
 
 def with_sign_of(sign: jax.Array, q: Quaternion) -> Quaternion:
     """The quaternion where `sign` ≥ 0, its negative elsewhere: sign(0) counts as +1."""
-    flip = is_positive(-sign)
-    w, x, y, z = q
-    return (jnp.where(flip, -w, w), jnp.where(flip, -x, x), jnp.where(flip, -y, y), jnp.where(flip, -z, z))
+    return scale(q, 1 - 2 * is_positive(-sign).astype(sign.dtype))
 
 
 def scale(q: Quaternion, factor: jax.Array) -> Quaternion:

@@ -33,14 +33,18 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """
     norm = lax.stop_gradient(norm)
     largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 4)
+    # 1 instead of 0 keeps every quotient finite.
+    is_zero = factor == 0
+    factor = jnp.where(is_zero, jnp.ones_like(factor), factor)
     scale = jnp.minimum(factor, largest / norm)
-    spent = jnp.minimum(factor * norm, largest)
+    tiny = float(jnp.finfo(factor.dtype).tiny)
+    spent = jnp.clip(factor * norm, tiny, largest)
     for lower in range(1, order + 1):
         # The minimum keeps XLA from turning x/y/z into x/(y z), which overflows.
         left = jnp.minimum(largest * 2.0 ** (-12 * lower) / spent, largest)
         scale = jnp.minimum(factor, left / (norm * norm))
-        spent = spent * (scale * norm) * norm
-    return scale
+        spent = jnp.maximum(spent * (scale * norm) * norm, tiny)
+    return jnp.where(is_zero, jnp.zeros_like(scale), scale)
 
 
 def halves(scale: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -56,7 +60,10 @@ def scaled_response(response: Callable[[Vec3], Vec3], load: Vec3, scale: jax.Arr
     divisions, because XLA:CPU stores quotients and forms products again in each entry of the result; the transpose,
     the reverse mode, has them in the other order. With products it took 1.7 times as long.
     """
-    before, after = halves(scale)
+    # 1/0 would be infinite, which `checkify` and `jax_debug_infs` report.
+    is_zero = scale == 0
+    before, after = halves(jnp.where(is_zero, jnp.ones_like(scale), scale))
+    load = _mat3.where(is_zero, _mat3.scale_vector(load, 0.0), load)
     return _divided(response(_divided(load, 1 / before)), 1 / after)
 
 

@@ -1,11 +1,15 @@
 """Exact scaling by powers of two; divisions and roots that are safe where their argument is 0."""
 
+from typing import TypeVar
+
 import jax
 import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
 from jaxrot._mat3 import Mat3
+
+_Tree = TypeVar("_Tree")
 
 
 def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
@@ -30,12 +34,13 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
     return lax.bitcast_convert_type(inverse << mantissa_bits, magnitude.dtype)
 
 
-def power_of_two(m: Mat3) -> jax.Array:
-    """The power of two that brings the largest entry into [1, 2) when it divides the matrix; NaN if that is not finite.
+def power_of_two(m: object) -> jax.Array:
+    """The power of two that brings the largest entry into [1, 2) when it divides all of them.
 
-    For 0 and subnormal numbers it is the smallest normal one. It is a constant to differentiation.
+    Where that is not finite it is NaN; for 0 and subnormal numbers it is the smallest normal one. It is a constant to
+    differentiation.
     """
-    largest = _mat3.largest_entry(m)
+    largest = _mat3.largest_entry(lax.stop_gradient(m))
     info = jnp.finfo(largest.dtype)
     integer = jnp.dtype(f"int{info.bits}")
     normal = jnp.maximum(largest, float(info.tiny))
@@ -44,15 +49,15 @@ def power_of_two(m: Mat3) -> jax.Array:
     # Of inf the mantissa is 1 too; inf/inf makes the power NaN.
     mantissa = jnp.where(normal == jnp.inf, normal, lax.bitcast_convert_type(fraction | one, normal.dtype))
     # The maximum keeps XLA from turning x/(y/z) into (x z)/y, which rounds, and overflows at the largest numbers.
-    return lax.stop_gradient(jnp.maximum(normal / mantissa, float(info.tiny)))
+    return jnp.maximum(normal / mantissa, float(info.tiny))
 
 
-def scaled(m: Mat3) -> Mat3:
-    """The matrix over a power of two that brings its largest entry into [1, 2); NaN everywhere where it is not finite.
+def scaled(m: _Tree) -> _Tree:
+    """The entries of a matrix or quaternion over the power of two that brings the largest one into [1, 2).
 
-    Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for bit. A zero matrix stays zero. The entries are quotients,
-    which XLA:CPU stores, one array each; a product it would form again from the (..., 3, 3) array in every pass, with
-    the largest entry: the default method took 1.2 times as long.
+    Where one is not finite all are NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
+    bit. The entries are quotients, which XLA:CPU stores, one array each; a product it would form again from the
+    (..., 3, 3) array in every pass, with the largest entry: the default method took 1.2 times as long.
     """
     power = power_of_two(m)
     return jax.tree.map(lambda entry: entry / power, m)
@@ -69,7 +74,7 @@ def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
     """The quotient, and 0 where the denominator is 0; the derivative is finite there too."""
     is_zero = denominator == 0
     safe = jnp.where(is_zero, jnp.ones_like(denominator), denominator)
-    return jnp.where(is_zero, jnp.zeros_like(numerator), numerator) / safe
+    return jnp.where(is_zero, jnp.zeros_like(denominator), numerator / safe)
 
 
 def safe_sqrt(square: jax.Array) -> jax.Array:

@@ -1,9 +1,10 @@
 """Eigenvalues and eigenvectors of symmetric 3×3 matrices in straight-line arithmetic, equal eigenvalues included."""
 
 import jax.numpy as jnp
+from jax import lax
 
 from jaxrot import _mat3
-from jaxrot._choice import computed_once, is_positive
+from jaxrot._choice import computed_once, is_positive, sign_of
 from jaxrot._jacobi import diagonalising
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import safe_divide, safe_sqrt
@@ -40,23 +41,24 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     scaled: Mat3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     p = _mat3.determinant(scaled) * 0.5
     largest_is_simple = is_positive(p)
-    p = jnp.minimum(jnp.abs(p), 1)
+    p = jnp.abs(p)
+    p = jnp.where(p > 1, jnp.ones_like(p), p)
     root = jnp.full_like(p, 2)
     for _ in range(_NEWTON_STEPS):
         square = root * root
         root = 2 * (square * root + p) / (3 * square - 3)
     root = jnp.where(largest_is_simple, root, -root)
     adjugate = _mat3.cofactor(_mat3.add_to_diagonal(scaled, -root))
-    simple, largest = adjugate[0], jnp.abs(adjugate[0][0])
+    sizes = [lax.stop_gradient(jnp.abs(adjugate[i][i])) for i in range(3)]
+    simple, largest = adjugate[0], sizes[0]
     for i in (1, 2):
-        is_larger = is_positive(jnp.abs(adjugate[i][i]) - largest)
-        simple = _mat3.where(is_larger, adjugate[i], simple)
-        largest = jnp.maximum(largest, jnp.abs(adjugate[i][i]))
+        simple = _mat3.where(is_positive(sizes[i] - largest), adjugate[i], simple)
+        largest = jnp.maximum(largest, sizes[i])
     length = safe_sqrt(_mat3.dot(simple, simple))
     x, y, z = (component / length for component in simple)
 
     # Two perpendicular axes; the sign keeps the denominator away from 0 (Duff et al. 2017).
-    sign = jnp.where(z < 0, -jnp.ones_like(z), jnp.ones_like(z))
+    sign = sign_of(z)
     quotient = -1 / (sign + z)
     u: Vec3 = (1 + sign * x * x * quotient, sign * x * y * quotient, -sign * x)
     v: Vec3 = (x * y * quotient, sign + y * y * quotient, -y)

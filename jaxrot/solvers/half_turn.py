@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _definite, _mat3, _quaternion
-from jaxrot._choice import choose, computed_once, index_of_largest
+from jaxrot._choice import choose, computed_once, constant_like, index_of_largest, sign_of
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
 from jaxrot._scaling import safe_divide, scaled
@@ -84,7 +84,7 @@ def signed_sum(a: Mat3) -> jax.Array:
     determinant = _mat3.dot(a[0], cofactor[0])
     volume = jnp.abs(determinant)
     info = jnp.finfo(square.dtype)
-    sign = jnp.where(determinant < 0, -jnp.ones_like(square), jnp.ones_like(square))
+    sign = sign_of(determinant)
     f = jnp.sqrt(3 * square)
     steps = _NEWTON_STEPS[square.dtype.name]
     for step in range(steps):
@@ -110,7 +110,7 @@ def nearest_to_definite(a: Mat3, f: jax.Array, *, is_chosen: bool = True) -> Qua
         is_chosen: Whether there is a half turn in front, static. Without it the system is singular where R is a half
             turn, and the first component, 1 here, is none of the quaternion's.
     """
-    size, sign = jnp.abs(f), jnp.where(f < 0, -jnp.ones_like(f), jnp.ones_like(f))
+    size, sign = jnp.abs(f), sign_of(f)
     eps, tiny = float(jnp.finfo(f.dtype).eps), float(jnp.finfo(f.dtype).tiny)
     shifted = size * (1 + 16 * eps)
     cofactor, gram = _mat3.cofactor(a), _mat3.transpose_multiply(a, a)
@@ -122,10 +122,10 @@ def nearest_to_definite(a: Mat3, f: jax.Array, *, is_chosen: bool = True) -> Qua
     k = (
         computed_once(index_of_largest((x + y + z, x - y - z, y - x - z, z - x - y)))
         if is_chosen
-        else jnp.zeros_like(f)
+        else constant_like(f, 0)
     )
 
-    one = jnp.ones_like(f)
+    one = constant_like(f, 1)
     flips = (choose(k, one, one, -one, -one), choose(k, one, -one, one, -one))
     rows = [_mat3.scale_vector(row, sign * flip) for row, flip in zip(a, (*flips, flips[0] * flips[1]), strict=True)]
     b = (rows[0], rows[1], rows[2])
@@ -150,7 +150,7 @@ def half_turn(a: Mat3, q: Quaternion, f: jax.Array) -> Quaternion:
     """Where f < 0: q, the quaternion of R(−A), after half a turn about the weakest axis of its stretch; unit length."""
     h, _ = _gaps_and_torque(a, q)
     # The stretch is σ(tr(B)·1 − H): without their traces the two differ by the sign alone.
-    sign = jnp.where(f < 0, jnp.ones_like(f), -jnp.ones_like(f))
+    sign = -sign_of(f)
     deviator = _mat3.scale(_mat3.add_to_diagonal(h, _mat3.trace(h) * (-1 / 3)), sign)
     x, y, z = _definite.null_vector(_mat3.add_to_diagonal(deviator, -_smallest_eigenvalue(deviator)))
     turned = _quaternion.product(q, (jnp.zeros_like(x), x, y, z))

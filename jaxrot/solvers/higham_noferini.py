@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._choice import constant_like
 from jaxrot._quaternion import Columns, Quaternion
 from jaxrot._scaling import safe_divide, unit_scaled
 from jaxrot.solvers.foam import largest_root
@@ -61,7 +62,7 @@ def null_vector(columns: Columns) -> Quaternion:
                 m[i][j] = m[i][j] - factor * m[k][j]
             m[i][k] = factor
     pivots = [jnp.maximum(m[k][k], smallest) for k in range(4)]
-    zero, one = jnp.zeros_like(trace), jnp.ones_like(trace)
+    zero, one = constant_like(trace, 0), constant_like(trace, 1)
     x = _backward(m, [zero, zero, zero, one])
     for _ in range(_INVERSE_ITERATIONS):
         x = _forward(m, x)

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _jacobi, _mat3
+from jaxrot._choice import constant_like
 from jaxrot._mat3 import Vec3
 from jaxrot._scaling import safe_divide, safe_sqrt, scaled
 
@@ -40,7 +41,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     for condition in (is_first | is_second, is_second):
         (s, axes) = _rolled(condition, s), _jacobi.rolled(condition, axes)
     images = [_mat3.apply(a, axis) for axis in axes]
-    one = jnp.ones_like(limit)
+    one = constant_like(limit, 1)
     u0, u1, u2 = (_mat3.scale_vector(image, safe_divide(one, size)) for image, size in zip(images, s, strict=True))
 
     product = _mat3.cross(u0, u1)

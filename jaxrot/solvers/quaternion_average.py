@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
-from jaxrot._choice import choose, computed_once, index_of_largest
+from jaxrot._choice import choose, computed_once, constant_like, index_of_largest
 from jaxrot._quaternion import Columns, Quaternion
 from jaxrot._scaling import unit_scaled
 
@@ -32,7 +32,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     w, x, y, z = (choose(index, *components) for components in zip(*columns, strict=True))
     # All signs in one number, and that computed once: once for the index and for each sign takes 1.3 times as long.
     products = (_quaternion.dot((w, x, y, z), column) for column in columns)
-    zero = jnp.zeros_like(w)
+    zero = constant_like(w, 0)
     weights = (jnp.where(product < 0, 2.0**i, zero) for i, product in enumerate(products))
     signs = computed_once(functools.reduce(jnp.add, weights)).astype(jnp.int32)
     w, x, y, z = (_signed((signs >> i & 1) == 1, column) for i, column in enumerate(columns))

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._choice import constant_like
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
 from jaxrot._scaling import safe_sqrt
@@ -44,7 +45,7 @@ def leave_equilibrium(a: Mat3, q: Quaternion) -> Quaternion:
 
     # XLA computes what is cheap again for each component, where torque is rounding with another result: w might leave
     # and x stay. A quotient it computes once, so that both the angle and the decision, 2 for no, are in one.
-    two = jnp.full_like(c, 2)
+    two = constant_like(c, 2)
     cotangent = jnp.where(leaves, s, two) / jnp.where(leaves, safe_sqrt(s * s + c * c) - c, jnp.ones_like(c))
     turned = _quaternion.normalise(_quaternion.product(q, (cotangent, *axis)))
     w, x, y, z = (jnp.where(cotangent < 1, new, old) for new, old in zip(turned, q, strict=True))

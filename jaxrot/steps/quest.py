@@ -38,7 +38,8 @@ def correction(b: Mat3) -> Quaternion:
     """
     b = computed_once(b)
     # f is at least the trace of any rotation of A; less is rounding.
-    return cayley_map(b, jnp.maximum(sum_of_singular_values(b) - _mat3.trace(b), 0))
+    shift = sum_of_singular_values(b) - _mat3.trace(b)
+    return cayley_map(b, jnp.where(shift < 0, jnp.zeros_like(shift), shift))
 
 
 def sum_of_singular_values(a: Mat3) -> jax.Array:
