@@ -78,9 +78,9 @@ def apply_of(candidate: Candidate, *, takes_previous: bool) -> Apply:
 def nearest_rotation_from_cold(matrix: ArrayLike, rotation: ArrayLike, *, method: str) -> jax.Array:
     """`nearest_rotation` with the arguments and the result's shape of `refine_rotation`: the start is not used."""
     checked = check_matrix(matrix)
-    start = check_start(rotation, "rotation", (3, 3), checked.value).value
-    broadcast = jnp.broadcast_to(checked.value, start.shape)
-    return nearest_rotation(broadcast, method=method).astype(checked.dtype)
+    start = check_start(rotation, "rotation", (3, 3), checked)
+    batch = jnp.broadcast_shapes(checked.shape, start.shape)
+    return nearest_rotation(jnp.broadcast_to(checked, batch), method=method)
 
 
 def outside_domain(method: Method, sample: Sample) -> str | None:

@@ -5,6 +5,7 @@ import functools
 import jax
 from jax.typing import ArrayLike
 
+from jaxrot._compiled import compiled
 from jaxrot._inputs import check_matrix
 from jaxrot._saturation import factor_of, gain
 from jaxrot._scaling import safe_divide
@@ -35,8 +36,12 @@ def rotation_gap(matrix: ArrayLike) -> jax.Array:
     Source: Higham, "Functions of matrices", 2008, theorem 8.9 (the condition of the unitary polar factor of a real
     matrix is 2/(σ₂+σ₃)), with signed singular values.
     """
-    checked = check_matrix(matrix)
-    return _gap(checked.value, 0).astype(checked.dtype)
+    return _rotation_gap(check_matrix(matrix))
+
+
+@compiled
+def _rotation_gap(matrix: jax.Array) -> jax.Array:
+    return _gap(matrix, 0)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))

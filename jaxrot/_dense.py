@@ -4,9 +4,12 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._choice import exchange
+from jaxrot._compiled import compiled
 from jaxrot._derivative import inverse_gap_matrix, stretch_tangent
 from jaxrot._inputs import check_choice, check_damping, check_flag, check_matrix
 from jaxrot._mat3 import Mat3, Vec3
@@ -57,12 +60,16 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
 
     Source: Kim and Eberle, "Dynamic deformables", 2020 (the rotation gradient), with H instead of singular vectors.
     """
-    checked = check_matrix(matrix)
-    method, damping = check_choice(method, "method", METHODS), check_damping(damping)
+    method = check_choice(method, "method", METHODS)
+    return _rotation_jacobian(check_matrix(matrix), method=method, damping=check_damping(damping))
+
+
+@compiled
+def _rotation_jacobian(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
     # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
-    rotation = nearest(checked.value, method, damping, 1)
-    inverse = inverse_gap_matrix(checked.value, rotation, damping=damping)
-    return _quadratic_form(_mat3.components(rotation), inverse).astype(checked.dtype)
+    rotation = nearest(matrix, method, damping, 1)
+    inverse = inverse_gap_matrix(matrix, rotation, damping=damping)
+    return _quadratic_form(_mat3.components(rotation), inverse)
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
@@ -87,16 +94,20 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
 
     Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
     """
-    checked = check_matrix(matrix)
-    left, s, normalised, right = decomposed(checked.value, 1)
+    return _twist_modes(check_matrix(matrix))
+
+
+@compiled
+def _twist_modes(matrix: jax.Array) -> TwistModes:
+    left, s, normalised, right = decomposed(matrix, 1)
     u, v = _mat3.components(left), _mat3.components(right)
-    factor = factor_of(checked.value)
+    factor = factor_of(matrix)
     gaps = reciprocal_gaps(s, normalised, factor, 1)
     eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * gain(factor, gaps.norm, 0)[..., None]
     axes = _mat3.identity_like(u)
     modes = [_mat3.multiply(u, _mat3.multiply(_mat3.skew(axis), _mat3.transpose(v))) for axis in axes]
     stacked = jnp.stack([_mat3.stack(_mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)
-    return TwistModes(eigenvalues.astype(checked.dtype), stacked.astype(checked.dtype))
+    return TwistModes(eigenvalues, stacked)
 
 
 def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
@@ -125,14 +136,15 @@ def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
 
     Source: Smith, de Goes and Kim 2019; Lin et al., "Isotropic ARAP energy using Cauchy–Green invariants", 2022.
     """
-    checked = check_matrix(matrix)
-    rotation = nearest(checked.value, DEFAULT_METHOD, 0.0, 1)
-    if check_flag(psd, "psd"):
-        inverse = _mat3.components(_clamped(checked.value))
-    else:
-        inverse = inverse_gap_matrix(checked.value, rotation)
+    return _arap_hessian(check_matrix(matrix), psd=check_flag(psd, "psd"))
+
+
+@compiled
+def _arap_hessian(matrix: jax.Array, *, psd: bool) -> jax.Array:
+    rotation = nearest(matrix, DEFAULT_METHOD, 0.0, 1)
+    inverse = _mat3.components(_clamped(matrix)) if psd else inverse_gap_matrix(matrix, rotation)
     jacobian = _quadratic_form(_mat3.components(rotation), inverse)
-    return (2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)).astype(checked.dtype)
+    return 2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)
 
 
 @jax.custom_jvp
@@ -161,23 +173,32 @@ def _clamped_jvp(primals, tangents):
 
 
 def _gaps(singular_values: jax.Array) -> Vec3:
+    # Singular values may be infinite where the matrix is not, and their differences must not be NaN.
+    bound = jnp.finfo(singular_values.dtype).max / 4
+    singular_values = lax.clamp(-bound, singular_values, bound)
     s1, s2, s3 = singular_values[..., 0], singular_values[..., 1], singular_values[..., 2]
     return s2 + s3, s3 + s1, s1 + s2
 
 
 def _clamped_inverses(gaps: Vec3) -> Vec3:
-    x, y, z = (1 / jnp.maximum(gap, 2) for gap in gaps)
+    x, y, z = (1 / _at_least_two(gap) for gap in gaps)
     return x, y, z
+
+
+def _at_least_two(gap: jax.Array) -> jax.Array:
+    # Not a maximum: on jax 0.10 its derivative fails inside `vmap` on a mesh with Explicit axes.
+    return jnp.where(gap < 2, jnp.full_like(gap, 2), gap)
 
 
 def _slopes(gap: jax.Array, gaps: Vec3) -> Vec3:
     """(φ(g) − φ(gᵢ))/(g − gᵢ) for the three gᵢ, φ′ where they are equal: both clamped, 0; neither, −1/(g gᵢ)."""
 
     def slope(other: jax.Array) -> jax.Array:
-        larger, smaller = jnp.maximum(gap, other), jnp.minimum(gap, other)
+        smaller, larger = exchange(gap > other, gap, other)
         # The part of the way from the smaller to the larger on which φ is not constant.
-        share = jnp.where(smaller >= 2, jnp.ones_like(gap), safe_divide(jnp.maximum(larger - 2, 0), larger - smaller))
-        return -share / (jnp.maximum(larger, 2) * jnp.maximum(smaller, 2))
+        part = safe_divide(jnp.where(larger > 2, larger - 2, 0), larger - smaller)
+        share = jnp.where(smaller >= 2, jnp.ones_like(gap), part)
+        return -share / (_at_least_two(larger) * _at_least_two(smaller))
 
     x, y, z = (slope(other) for other in gaps)
     return x, y, z

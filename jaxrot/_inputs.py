@@ -1,5 +1,6 @@
 """The gate: every public function's arguments pass here, and fail here, while the program is traced."""
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -8,14 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
+# A checked argument. NumPy arrays stay what they are until a compiled program takes them.
+Array = jax.Array | np.ndarray
+
 _HALF_PRECISION = (jnp.float16.dtype, jnp.bfloat16.dtype)
 
 
-class Checked(NamedTuple):
-    """An argument that passed the gate.
+class Computing(NamedTuple):
+    """An argument in the dtype to compute in.
 
     Attributes:
-        value: The array in the dtype to compute in, float32 or float64.
+        value: The array, float32 or float64.
         dtype: The dtype in which the caller expects the result.
     """
 
@@ -23,72 +27,95 @@ class Checked(NamedTuple):
     dtype: np.dtype
 
 
-def _checked(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...], hint: str = "") -> Checked:
-    """Turns `argument` into a real floating array of shape (..., *trailing_shape), or raises naming it."""
+def check_array(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...], hint: str = "") -> Array:
+    """Returns a numeric array of shape (..., *trailing_shape), or raises an error that names the argument.
+
+    Raises:
+        ValueError: The shape is wrong.
+        TypeError: The dtype is complex, an object, a string, a date, long double or an eight-bit float.
+    """
     expected = f"{name} must be a real array of shape (..., {', '.join(map(str, trailing_shape))})"
-    try:
-        array = jnp.asarray(argument)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"{expected}; got {type(argument).__name__}, which is no numeric array ({error})") from None
+    array = _as_array(argument, name, expected)
     if array.shape[-len(trailing_shape) :] != trailing_shape:
         raise ValueError(f"{expected}; got shape {array.shape}{hint if array.shape[:2] == trailing_shape else ''}")
-    if jnp.issubdtype(array.dtype, jnp.integer) or array.dtype == jnp.bool_:
-        array = array.astype(jnp.result_type(float))
-    if not jnp.issubdtype(array.dtype, jnp.floating):
-        raise TypeError(f"{expected}; got dtype {array.dtype}")
-    if array.dtype in _HALF_PRECISION:
-        return Checked(array.astype(jnp.float32), array.dtype)
-    if array.dtype not in (jnp.float32.dtype, jnp.float64.dtype):
-        raise TypeError(f"{name} must be float16, bfloat16, float32, float64, int or bool; got dtype {array.dtype}")
-    return Checked(array, array.dtype)
+    _computing_dtype(array.dtype, expected)
+    return array
 
 
-def check_matrix(matrix: ArrayLike, name: str = "matrix") -> Checked:
-    """Admits a batch of 3×3 matrices.
+def computing(array: jax.Array) -> Computing:
+    """Converts a checked array: half precision to float32, integers and booleans to the default floating dtype.
 
-    Half precision is computed in float32: three digits are too few for a determinant. Integers and booleans become
-    the default floating dtype.
+    Half precision has three digits, too few for a determinant.
+    """
+    dtype = array.dtype
+    if not jnp.issubdtype(dtype, jnp.floating):
+        dtype = jnp.result_type(float)
+    return Computing(array.astype(_computing_dtype(array.dtype, "")), dtype)
+
+
+def _as_array(argument: ArrayLike, name: str, expected: str) -> Array:
+    if isinstance(argument, jax.Array):
+        return argument
+    if isinstance(argument, np.ndarray):
+        if argument.dtype == np.longdouble != np.float64:
+            raise TypeError(f"{expected}; got dtype {argument.dtype}: convert it by {name}.astype(numpy.float64)")
+        # The compiled program takes it as it is; `jnp.asarray` would be a program of its own.
+        return argument.astype(argument.dtype.newbyteorder("="), copy=False)
+    try:
+        return jnp.asarray(argument)
+    except OverflowError:
+        raise TypeError(f"{expected}; got an integer of more than 64 bits: pass floats instead") from None
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{expected}; got {type(argument).__name__}, not a numeric array ({error})") from None
+
+
+def _computing_dtype(dtype: np.dtype, expected: str) -> np.dtype:
+    if jnp.issubdtype(dtype, jnp.integer) or dtype == jnp.bool_:
+        return jnp.result_type(float)
+    if dtype in _HALF_PRECISION:
+        return jnp.float32.dtype
+    if dtype in (jnp.float32.dtype, jnp.float64.dtype):
+        return dtype
+    raise TypeError(f"{expected} in float16, bfloat16, float32, float64, int or bool; got dtype {dtype}")
+
+
+def check_matrix(matrix: ArrayLike, name: str = "matrix") -> Array:
+    """Returns a batch of 3×3 matrices in the dtype in which the caller passed them.
 
     Args:
         matrix: Real array-like of shape (..., 3, 3).
         name: What the caller's argument is called, for the message.
 
-    Returns:
-        The array to compute with and the dtype to return.
-
     Raises:
         ValueError: The last two axes are not (3, 3).
-        TypeError: The dtype is complex, an object, a string or an eight-bit float.
+        TypeError: The dtype is not real, or jaxrot does not compute in it.
     """
     hint = "; if the batch axes trail, use jax.vmap(f, in_axes=-1, out_axes=-1)"
-    return _checked(matrix, name, (3, 3), hint)
+    return check_array(matrix, name, (3, 3), hint)
 
 
-def check_start(start: ArrayLike, name: str, trailing_shape: tuple[int, ...], matrix: jax.Array) -> Checked:
-    """Admits a warm start and gives it the matrices' computing dtype and a batch shape that holds both.
+def check_start(start: ArrayLike, name: str, trailing_shape: tuple[int, ...], matrix: Array) -> Array:
+    """Returns a warm start whose batch axes broadcast against those of the matrices.
 
     Args:
-        start: Real array-like of shape (..., *trailing_shape); its batch axes broadcast against those of `matrix`.
+        start: Real array-like of shape (..., *trailing_shape).
         name: What the caller's argument is called, for the message.
         trailing_shape: (3, 3) for rotations, (4,) for quaternions.
-        matrix: The matrices, already admitted, of shape (..., 3, 3).
-
-    Returns:
-        The start of shape (*batch, *trailing_shape), and its own dtype.
+        matrix: The checked matrices, of shape (..., 3, 3).
 
     Raises:
         ValueError: The shape is wrong, or the batch axes do not broadcast.
         TypeError: The dtype is not real.
     """
-    checked = _checked(start, name, trailing_shape)
-    batch = checked.value.shape[: -len(trailing_shape)]
+    checked = check_array(start, name, trailing_shape)
+    batch = checked.shape[: -len(trailing_shape)]
     try:
-        batch = jnp.broadcast_shapes(batch, matrix.shape[:-2])
+        jnp.broadcast_shapes(batch, matrix.shape[:-2])
     except ValueError:
         raise ValueError(
             f"the batch axes of matrix and {name} must broadcast; got {matrix.shape[:-2]} and {batch}"
         ) from None
-    return Checked(jnp.broadcast_to(checked.value.astype(matrix.dtype), batch + trailing_shape), checked.dtype)
+    return checked
 
 
 def check_choice(choice: str, name: str, registry: Mapping[str, object]) -> str:
@@ -110,13 +137,24 @@ def check_iterations(iterations: int) -> int:
 
     Raises:
         TypeError: It is no Python integer (a traced value included: the trip count must be static).
-        ValueError: It is negative.
+        ValueError: It is negative, or more than the counter of a loop holds.
     """
-    if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer):
-        raise TypeError(f"iterations must be a static Python integer; got {type(iterations).__name__}")
-    if iterations < 0:
-        raise ValueError(f"iterations must be >= 0; got {iterations}")
-    return int(iterations)
+    return check_integer(iterations, "iterations", 0)
+
+
+def check_integer(number: int, name: str, least: int) -> int:
+    """Returns a static integer between a least value and the largest of 32 bits.
+
+    Raises:
+        TypeError: It is no Python integer (a traced value included: it decides what is computed).
+        ValueError: It is too small or too large.
+    """
+    if isinstance(number, bool | np.bool_) or not isinstance(number, int | np.integer):
+        raise TypeError(f"{name} must be a static Python integer; got {type(number).__name__}")
+    if not least <= number < 2**31:
+        shown = number if abs(int(number)) < 2**64 else "an integer of more than 64 bits"
+        raise ValueError(f"{name} must be >= {least} and < 2**31; got {shown}")
+    return int(number)
 
 
 def check_damping(damping: float) -> float:
@@ -128,9 +166,13 @@ def check_damping(damping: float) -> float:
     """
     if isinstance(damping, bool) or not isinstance(damping, int | float | np.integer | np.floating):
         raise TypeError(f"damping must be a static Python number; got {type(damping).__name__}")
-    if not (np.isfinite(damping) and damping >= 0):
-        raise ValueError(f"damping must be finite and >= 0; got {damping}")
-    return float(damping)
+    try:
+        number = float(damping)
+    except OverflowError:
+        number = math.inf
+    if not 0 <= number < math.inf:
+        raise ValueError(f"damping must be finite and >= 0; got {number}")
+    return number
 
 
 def check_flag(flag: bool, name: str) -> bool:

@@ -6,6 +6,7 @@ import jax
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._compiled import compiled
 from jaxrot._derivative import rotation_tangent
 from jaxrot._inputs import check_choice, check_damping, check_matrix
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
@@ -47,9 +48,8 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
 
     Source: Müller et al. 2016, section 3 (the problem); `METHODS[method].source` (the algorithm).
     """
-    checked = check_matrix(matrix)
     method = check_choice(method, "method", METHODS)
-    return nearest(checked.value, method, check_damping(damping), 0).astype(checked.dtype)
+    return _nearest_rotation(check_matrix(matrix), method=method, damping=check_damping(damping))
 
 
 def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
@@ -78,11 +78,19 @@ def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, 
 
     Source: Shepperd 1978, for the conversion.
     """
-    checked = check_matrix(matrix)
     method = check_choice(method, "method", METHODS)
-    rotation = nearest(checked.value, method, check_damping(damping), 0)
-    quaternion = _quaternion.from_rotation(_mat3.components(rotation))
-    return _quaternion.stack(quaternion).astype(checked.dtype)
+    return _nearest_quaternion(check_matrix(matrix), method=method, damping=check_damping(damping))
+
+
+@compiled
+def _nearest_rotation(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
+    return nearest(matrix, method, damping, 0)
+
+
+@compiled
+def _nearest_quaternion(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
+    rotation = nearest(matrix, method, damping, 0)
+    return _quaternion.stack(_quaternion.from_rotation(_mat3.components(rotation)))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1, 2, 3))

@@ -7,11 +7,12 @@ import jax
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._compiled import compiled
 from jaxrot._derivative import stretch_tangent
-from jaxrot._inputs import check_matrix
-from jaxrot._nearest import nearest_rotation
+from jaxrot._inputs import check_choice, check_matrix
+from jaxrot._nearest import nearest
 from jaxrot._scaling import power_of_two, scaled
-from jaxrot.solvers import DEFAULT_METHOD
+from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
 class PolarDecomposition(NamedTuple):
@@ -56,10 +57,13 @@ def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> P
 
     Source: Higham 1986; for R see `nearest_rotation`.
     """
-    checked = check_matrix(matrix)
-    rotation = nearest_rotation(checked.value, method=method)
-    stretch = _stretch(checked.value, rotation, 0)
-    return PolarDecomposition(rotation.astype(checked.dtype), stretch.astype(checked.dtype))
+    return _polar_decomposition(check_matrix(matrix), method=check_choice(method, "method", METHODS))
+
+
+@compiled
+def _polar_decomposition(matrix: jax.Array, *, method: str) -> PolarDecomposition:
+    rotation = nearest(matrix, method, 0.0, 0)
+    return PolarDecomposition(rotation, _stretch(matrix, rotation, 0))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2,))

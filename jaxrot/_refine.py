@@ -1,14 +1,18 @@
 """The nearest rotation from a warm start, by a fixed number of steps."""
 
 import functools
+from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._compiled import compiled
 from jaxrot._derivative import angular_tangent
 from jaxrot._inputs import check_choice, check_flag, check_iterations, check_matrix, check_start
-from jaxrot._scaling import scaled
+from jaxrot._quaternion import Quaternion
+from jaxrot._scaling import safe_sqrt, scaled
 from jaxrot.steps import STEPS
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
@@ -80,12 +84,8 @@ def refine_rotation(
     Source: `STEPS[step].source`; for `torque` with the errata stated in `steps/torque.py`.
     """
     checked = check_matrix(matrix)
-    start = check_start(rotation, "rotation", (3, 3), checked.value).value
-    # Neither its length nor its sign matters.
-    columns = _quaternion.davenport_columns(_mat3.components(start))
-    quaternion = _quaternion.stack(_quaternion.largest_column(columns))
-    refined = _refine(checked.value, quaternion, step, iterations, escape, derivative)
-    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined))).astype(checked.dtype)
+    start = check_start(rotation, "rotation", (3, 3), checked)
+    return _refine_rotation(checked, start, options=_checked_options(step, iterations, escape, derivative))
 
 
 def refine_quaternion_wxyz(
@@ -126,18 +126,46 @@ def refine_quaternion_wxyz(
     Source: Müller et al. 2016, appendix D.
     """
     checked = check_matrix(matrix)
-    start = check_start(quaternion_wxyz, "quaternion_wxyz", (4,), checked.value).value
-    quaternion = _quaternion.stack(_quaternion.normalise(_quaternion.components(start)))
-    return _refine(checked.value, quaternion, step, iterations, escape, derivative).astype(checked.dtype)
+    start = check_start(quaternion_wxyz, "quaternion_wxyz", (4,), checked)
+    return _refine_quaternion(checked, start, options=_checked_options(step, iterations, escape, derivative))
 
 
-def _refine(
-    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, derivative: str
-) -> jax.Array:
-    step = check_choice(step, "step", STEPS)
-    iterations, escape = check_iterations(iterations), check_flag(escape, "escape")
-    matrix = jax.numpy.broadcast_to(matrix, (*quaternion.shape[:-1], 3, 3))
-    if check_choice(derivative, "derivative", _DERIVATIVES) == "unrolled":
+class _Options(NamedTuple):
+    step: str
+    iterations: int
+    escape: bool
+    derivative: str
+
+
+def _checked_options(step: str, iterations: int, escape: bool, derivative: str) -> _Options:
+    return _Options(
+        step=check_choice(step, "step", STEPS),
+        iterations=check_iterations(iterations),
+        escape=check_flag(escape, "escape"),
+        derivative=check_choice(derivative, "derivative", _DERIVATIVES),
+    )
+
+
+@compiled
+def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Options) -> jax.Array:
+    start = scaled(_mat3.components(rotation))
+    # The shift is the scale c of the start c·Q: without it the columns are multiples of Q's quaternion at c = 1 only.
+    columns = _quaternion.davenport_columns(start, safe_sqrt(_mat3.squared_norm(start) / 3))
+    refined = _refine(matrix, _quaternion.largest_column(columns), options)
+    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined)))
+
+
+@compiled
+def _refine_quaternion(matrix: jax.Array, quaternion_wxyz: jax.Array, *, options: _Options) -> jax.Array:
+    return _refine(matrix, scaled(_quaternion.components(quaternion_wxyz)), options)
+
+
+def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> jax.Array:
+    step, iterations, escape, derivative = options
+    quaternion = _quaternion.stack(_quaternion.normalise(start))
+    batch = jnp.broadcast_shapes(matrix.shape[:-2], quaternion.shape[:-1])
+    matrix, quaternion = jnp.broadcast_to(matrix, (*batch, 3, 3)), jnp.broadcast_to(quaternion, (*batch, 4))
+    if derivative == "unrolled":
         return _iterated(matrix, quaternion, step, iterations, escape)
     return _refined(matrix, quaternion, step, iterations, escape, 0)
 

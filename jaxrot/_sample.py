@@ -10,7 +10,7 @@ import numpy as np
 from jax import core
 from jax.typing import ArrayLike, DTypeLike
 
-from jaxrot._inputs import check_matrix, check_start
+from jaxrot._inputs import check_matrix, check_start, computing
 from jaxrot.measuring import domain
 from jaxrot.measuring.judging import Judged, judge
 
@@ -61,7 +61,7 @@ def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLik
         ValueError: A shape, a dtype or the contents are not what is expected.
         TypeError: Arrays that are not real, or traced.
     """
-    checked = check_matrix(matrices, "matrices").value
+    checked = computing(jnp.asarray(check_matrix(matrices, "matrices"))).value
     for name, array in (("matrices", checked), ("previous", previous)):
         if isinstance(array, core.Tracer):
             raise TypeError(
@@ -71,8 +71,9 @@ def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLik
     checked = checked.astype(_check_dtype(dtype) if dtype is not None else checked.dtype)
     starts = None
     if previous is not None:
-        starts = check_start(previous, "previous", (3, 3), checked).value
-        checked = jnp.broadcast_to(checked, starts.shape)
+        starts = check_start(previous, "previous", (3, 3), checked).astype(checked.dtype)
+        batch = jnp.broadcast_shapes(checked.shape, starts.shape)
+        checked, starts = jnp.broadcast_to(checked, batch), jnp.broadcast_to(starts, batch)
     if checked.size == 0:
         raise ValueError(f"matrices must hold at least one matrix; got shape {checked.shape}")
     a = np.asarray(checked).reshape(-1, 3, 3)

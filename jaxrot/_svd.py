@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._compiled import compiled
 from jaxrot._complex import Complex, multiply, reciprocal, square, times
 from jaxrot._derivative import resolved_gap
 from jaxrot._inputs import check_matrix
@@ -64,11 +65,13 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
     Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
     the eigenvectors of the stretch, by `_symmetric.eigen`.
     """
-    checked = check_matrix(matrix)
-    left, singular_values, _, right = decomposed(checked.value, 0)
-    return RotationVariantSVD(
-        left.astype(checked.dtype), singular_values.astype(checked.dtype), right.astype(checked.dtype)
-    )
+    return _rotation_variant_svd(check_matrix(matrix))
+
+
+@compiled
+def _rotation_variant_svd(matrix: jax.Array) -> RotationVariantSVD:
+    left, singular_values, _, right = decomposed(matrix, 0)
+    return RotationVariantSVD(left, singular_values, right)
 
 
 def signed_singular_values(matrix: ArrayLike) -> jax.Array:
@@ -94,8 +97,12 @@ def signed_singular_values(matrix: ArrayLike) -> jax.Array:
 
     Source: as for `rotation_variant_svd`.
     """
-    checked = check_matrix(matrix)
-    return decomposed(checked.value, 0)[1].astype(checked.dtype)
+    return _signed_singular_values(check_matrix(matrix))
+
+
+@compiled
+def _signed_singular_values(matrix: jax.Array) -> jax.Array:
+    return decomposed(matrix, 0)[1]
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))

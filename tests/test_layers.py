@@ -10,7 +10,7 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
     {"_blocks", "_choice", "_complex", "_inputs", "_mat3", "_quaternion", "_scaling", "families"},
-    {"_definite", "_jacobi", "_saturation", "_symmetric"},
+    {"_compiled", "_definite", "_jacobi", "_saturation", "_symmetric"},
     {"_derivative"},
     {"steps"},
     {"solvers"},
@@ -68,7 +68,10 @@ def test_the_core_imports_jax_and_numpy_alone(path):
             "numpy",
             "jaxrot",
             "collections",
+            "dataclasses",
             "functools",
+            "inspect",
+            "math",
             "random",
             "time",
             "types",
