@@ -1,5 +1,6 @@
 """jaxrot: the rotation in a 3×3 matrix, in batches, differentiable to any order, right for every finite input."""
 
+from jaxrot import _startup as _startup  # the first: it handles Ctrl-C while the rest is imported
 from jaxrot import families as families
 from jaxrot._blocks import in_blocks as in_blocks
 from jaxrot._conditioning import rotation_gap as rotation_gap

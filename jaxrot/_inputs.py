@@ -184,3 +184,30 @@ def check_flag(flag: bool, name: str) -> bool:
     if not isinstance(flag, bool | np.bool_):
         raise TypeError(f"{name} must be a static Python bool; got {type(flag).__name__}")
     return bool(flag)
+
+
+def layout_hint(shape: tuple[int, ...]) -> str:
+    """The line of NumPy that converts an array of another layout to shape (..., 3, 3), for the end of a message.
+
+    Args:
+        shape: Of the array.
+
+    Returns:
+        "; if ..., use ..." for every layout that it may have; "" if its shape is (..., 3, 3) or of no known layout.
+    """
+    if shape[-2:] == (3, 3):
+        return ""
+    # With several batch axes they are spelled out: -1 would merge them.
+    batch = "-1" if len(shape) < 3 else ", ".join(map(str, shape[:-1]))
+    last = {
+        (9,): f"each row is a matrix, use array.reshape({batch}, 3, 3)",
+        (12,): f"each row is a 3x4 pose, use array.reshape({batch}, 3, 4)[..., :3]",
+        (16,): f"each row is a 4x4 pose, use array.reshape({batch}, 4, 4)[..., :3, :3]",
+        (3, 4): "these are 3x4 poses, use array[..., :3]",
+        (4, 4): "these are 4x4 poses, use array[..., :3, :3]",
+    }
+    readings = [reading for end, reading in last.items() if shape[-len(end) :] == end]
+    if shape[:2] == (3, 3):
+        axes = "-1, 0" if len(shape) == 3 else "(0, 1), (-2, -1)"
+        readings.append(f"the batch comes last, use numpy.moveaxis(array, {axes})")
+    return "".join(f"; if {reading}" for reading in readings)

@@ -26,7 +26,7 @@ class Sample(NamedTuple):
         singular_values: Shape (count, 3), float64, signed. A prescribed spectrum is that of U diag(s) Vᵀ before its one
             rounding to dtype, which moves it by at most 2 eps s1 (and the spacing of subnormals): a gap s2 + s3 below
             that is the one intended. Others are LAPACK's, off by 18 float64 eps s1 at worst. For the rounded matrix to
-            the last digit see `jaxrot.measuring.reference`.
+            the last digit see `jaxrot.measuring.reference`. NaN where a recipe gives NaN or an infinity.
     """
 
     matrices: NDArray[np.floating]
@@ -86,10 +86,10 @@ class Family(NamedTuple):
         if isinstance(drawn, tuple):
             return _composed(draw.rotations(), drawn, draw.rotations(), draw)
         rounded = np.broadcast_to(drawn, (count, 3, 3)).astype(dtype)
-        left, values, right = np.linalg.svd(rounded.astype(np.float64))
-        # The determinant of the orthogonal factors has the sign of det A, and cannot underflow.
-        values[:, 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
-        return Sample(rounded, values)
+        is_finite = np.isfinite(rounded).all(axis=(1, 2))[:, None]  # LAPACK may never return from an infinity
+        left, values, right = np.linalg.svd(np.where(is_finite[..., None], rounded, 0).astype(np.float64))
+        values[:, 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))  # det A itself could underflow
+        return Sample(rounded, np.where(is_finite, values, np.nan))
 
 
 def half_turn_starts(rotations: ArrayLike, axes: ArrayLike | None = None) -> NDArray[np.floating]:

@@ -1,1 +1,1 @@
-"""What the commands share: the errors their user can mend, the folder they write, the progress bar."""
+"""What the commands share: their arguments, their errors, Ctrl-C, what they print and write, the progress bar."""

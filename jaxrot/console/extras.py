@@ -1,10 +1,10 @@
 """Packages that only a command needs: asked for before anything is computed."""
 
 import importlib.util
-import sys
 from collections.abc import Sequence
 
 from jaxrot.console.errors import UserError
+from jaxrot.console.printing import is_watched
 
 
 def check_installed(needed: Sequence[str], extra: str) -> None:
@@ -17,7 +17,7 @@ def check_installed(needed: Sequence[str], extra: str) -> None:
     Raises:
         UserError: One is not installed.
     """
-    needed = [*needed, *(["tqdm"] if sys.stderr.isatty() else [])]
+    needed = [*needed, *(["tqdm"] if is_watched() else [])]
     missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"

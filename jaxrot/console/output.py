@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from jaxrot.console.errors import UserError
+from jaxrot.console.errors import UserError, shown
 
 
 def check_writable(folder: Path) -> None:
@@ -19,11 +19,14 @@ def check_writable(folder: Path) -> None:
     """
     try:
         if folder.exists() and not folder.is_dir():
-            raise UserError(f"--out {folder}: this is a file; expected a folder, or a name for a new one")
+            raise UserError(f"--out {shown(folder)}: this is a file; expected a folder, or a name for a new one")
         nearest = next(place for place in [folder, *folder.absolute().parents] if place.exists())
         if not nearest.is_dir():
-            raise UserError(f"--out {folder}: {nearest} is a file; expected a folder, or a name for a new one")
-        os.rmdir(tempfile.mkdtemp(prefix=".jaxrot-", dir=nearest))
+            raise UserError(
+                f"--out {shown(folder)}: {shown(nearest)} is a file; expected a folder, or a name for a new one"
+            )
+        # A file without a name where the system has such: nothing is left behind, whenever Ctrl-C is pressed.
+        tempfile.TemporaryFile(prefix=".jaxrot-", dir=nearest).close()
     except OSError as error:
         raise _cannot_write(folder, error) from None
 
@@ -60,4 +63,6 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def _cannot_write(folder: Path, error: OSError) -> UserError:
     reason = (error.strerror or str(error)).lower()
-    return UserError(f"--out {folder}: cannot be written to ({reason}); expected a folder, or a name for a new one")
+    return UserError(
+        f"--out {shown(folder)}: cannot be written to ({reason}); expected a folder, or a name for a new one"
+    )

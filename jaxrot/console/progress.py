@@ -1,19 +1,23 @@
 """A progress bar where somebody is looking, silence elsewhere."""
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from jaxrot.console.interrupts import Interrupts
+from jaxrot.console.printing import is_watched
+
 
 @contextmanager
-def progress(steps: int) -> Iterator[Callable[[str], None]]:
+def progress(steps: int, interrupts: Interrupts) -> Iterator[Callable[[str], None]]:
     """Yields the function to call before each of `steps` steps, with what it is.
+
+    The function raises KeyboardInterrupt if Ctrl-C was pressed and nothing has dealt with it yet.
 
     The bar goes to stderr, so that the table on stdout can be redirected; where stderr is no terminal nothing is
     written and tqdm is not needed.
     """
-    if not sys.stderr.isatty():
-        yield lambda step: None
+    if not is_watched():
+        yield lambda step: interrupts.check()
         return
     from tqdm import tqdm
 
@@ -21,6 +25,7 @@ def progress(steps: int) -> Iterator[Callable[[str], None]]:
     with tqdm(total=steps, leave=False, bar_format="{percentage:3.0f}% |{bar:24}| {elapsed} {desc}") as bar:
 
         def advance(step: str) -> None:
+            interrupts.check()
             bar.set_description_str(step, refresh=False)
             # A step counts when the next begins: the bar is full only when the work is done.
             begun.append(step)

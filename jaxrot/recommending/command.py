@@ -10,10 +10,13 @@ import numpy as np
 from jaxrot import Recommendation
 from jaxrot._candidates import Candidate
 from jaxrot._recommend import number_of_steps, recommend_step_by_step
+from jaxrot.console.arguments import path
 from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment
-from jaxrot.console.errors import UserError
+from jaxrot.console.errors import UserError, shown
 from jaxrot.console.extras import check_installed
+from jaxrot.console.interrupts import Interrupts
+from jaxrot.console.printing import show
 from jaxrot.console.progress import progress
 from jaxrot.measuring.words import number
 from jaxrot.report.inputs import Input, read_input
@@ -25,44 +28,48 @@ _WIDTH = 100
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the options of a recommendation."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="matrices like yours: .npy or .npz, (..., 3, 3)")
+    parser.add_argument("file", type=path, metavar="FILE", help="matrices like yours: .npy or .npz, (..., 3, 3)")
     parser.add_argument(
         "--tolerance", metavar="E", required=True, help="the largest error ‖R - R*‖_F that is good enough, 1e-5 say"
     )
     parser.add_argument(
-        "--previous", type=Path, metavar="FILE", help="rotations to start from, one a matrix, such as the last frame's"
+        "--previous", type=path, metavar="FILE", help="rotations to start from, one a matrix, such as the last frame's"
     )
     parser.add_argument(
         "--dtype", metavar="DTYPE", help=f"{' or '.join(_DTYPES)} (float64 where FILE holds float64, else float32)"
     )
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Measures and prints; the user's mistakes are found before anything is measured.
 
     Returns:
         The exit status: 0, also where nothing meets the tolerance; the text says so.
 
     Raises:
-        UserError: Something the user can mend.
+        UserError: Something the user can fix.
+        UnreadError: Nobody reads standard output.
+        KeyboardInterrupt: The command was interrupted before there was a result.
     """
     tolerance = _parse_tolerance(options.tolerance)
     if options.dtype not in (None, *_DTYPES):
-        raise UserError(f"--dtype {options.dtype}: expected one of {', '.join(_DTYPES)}")
+        raise UserError(f"--dtype {shown(options.dtype)}: expected one of {', '.join(_DTYPES)}")
     check_installed([], "report")
     given = read_input(options.file, "FILE")
     matrices = np.concatenate(list(given.sets.values()))
     previous = None if options.previous is None else _read_previous(options.previous, given)
     dtype = options.dtype or given.dtype
     environment = describe_environment((dtype,))
-    with measuring_configuration(), progress(number_of_steps(has_previous=previous is not None)) as advance:
+    steps = number_of_steps(has_previous=previous is not None)
+    with measuring_configuration(), progress(steps, interrupts) as advance:
         try:
             with np.errstate(over="ignore", under="ignore"):
                 result = recommend_step_by_step(matrices, tolerance, previous, dtype, advance)
         except ValueError as error:
             # What a file holds is only seen when all of it is looked at, before anything is measured.
             raise UserError(str(error)) from None
-    print(_as_text(result, given, environment))
+    interrupts.hold()
+    show(_as_text(result, given, environment))
     return 0
 
 
@@ -72,25 +79,26 @@ def _parse_tolerance(word: str) -> float:
     except ValueError:
         tolerance = math.nan
     if not (math.isfinite(tolerance) and tolerance > 0):
-        raise UserError(f"--tolerance {word}: expected a number > 0, such as 1e-5")
+        raise UserError(f"--tolerance {shown(word)}: expected a number > 0, such as 1e-5")
     return tolerance
 
 
-def _read_previous(path: Path, given: Input) -> np.ndarray:
+def _read_previous(file: Path, given: Input) -> np.ndarray:
     """The starts, in the order of the matrices: by name where a file holds several arrays."""
-    starts = read_input(path, "--previous")
+    starts = read_input(file, "--previous")
     if len(given.sets) == len(starts.sets) == 1:
         pairs = [(*given.sets.values(), *starts.sets.values())]
     elif starts.sets.keys() >= given.sets.keys():
         pairs = [(part, starts.sets[name]) for name, part in given.sets.items()]
     else:
         raise UserError(
-            f"--previous {path}: it holds {', '.join(starts.sets)}; expected arrays called {', '.join(given.sets)}"
+            f"--previous {shown(file)}: it holds {', '.join(starts.sets)};"
+            f" expected arrays called {', '.join(given.sets)}"
         )
     for matrices, rotations in pairs:
         if len(matrices) != len(rotations):
             raise UserError(
-                f"--previous {path}: {len(rotations):,} rotations; expected {len(matrices):,}, one a matrix"
+                f"--previous {shown(file)}: {len(rotations):,} rotations; expected {len(matrices):,}, one a matrix"
             )
     return np.concatenate([rotations for _, rotations in pairs])
 

@@ -1,15 +1,20 @@
 """`python -m jaxrot report`: options, their checks, and the order of things."""
 
 import argparse
+import contextlib
 from pathlib import Path
 from typing import NamedTuple
 
 import jaxrot
+from jaxrot._startup import INTERRUPTED
+from jaxrot.console.arguments import path
 from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment
-from jaxrot.console.errors import UserError
+from jaxrot.console.errors import UserError, shown
 from jaxrot.console.extras import check_installed
+from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.output import check_writable, write_files
+from jaxrot.console.printing import show
 from jaxrot.console.progress import progress
 from jaxrot.report import bench
 from jaxrot.report.comparison import compare, read_report
@@ -49,33 +54,37 @@ _QUICK = _Size("float32", (10_000,), None, 100, 20_000, 20, 4.0, 4.0, 2.0)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the options of the report."""
     parser.add_argument(
-        "--out", type=Path, default=Path("jaxrot-report"), metavar="FOLDER", help="where to write (%(default)s/)"
+        "--out", type=path, default=Path("jaxrot-report"), metavar="FOLDER", help="where to write (%(default)s/)"
     )
-    parser.add_argument("--input", type=Path, metavar="FILE", help="your own matrices: .npy or .npz, (..., 3, 3)")
+    parser.add_argument("--input", type=path, metavar="FILE", help="your own matrices: .npy or .npz, (..., 3, 3)")
     parser.add_argument("--methods", metavar="A,B,...", help=f"which of {', '.join(jaxrot.METHODS)} (all)")
     parser.add_argument("--dtype", metavar="DTYPE", help=f"{', '.join(_DTYPES)} ({_FULL.dtype}; quick: {_QUICK.dtype})")
     parser.add_argument("--batch", metavar="N,N,...", help="batch sizes to time")
     parser.add_argument(
         "--peers", action="store_true", help="beside other packages, as far as they are installed (extra: peers)"
     )
-    parser.add_argument("--compare", type=Path, metavar="OLD.json", help="the report.json of an earlier run")
+    parser.add_argument("--compare", type=path, metavar="OLD.json", help="the report.json of an earlier run")
     parser.add_argument("--bench", action="store_true", help="instead: the library's own speed goals")
     parser.add_argument("--quick", action="store_true", help="under half a minute: one dtype, one batch size, no steps")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Measures, writes and prints; every mistake of the user's is found before anything is measured.
 
+    Once all is measured a Ctrl-C ends the drawing, and the report is written without pictures.
+
     Returns:
-        The exit status.
+        The exit status: 0; 130 where the drawing was interrupted.
 
     Raises:
-        UserError: Something the user can mend.
+        UserError: Something the user can fix.
+        UnreadError: Nobody reads standard output; the files are written.
+        KeyboardInterrupt: The command was interrupted before all was measured.
     """
     if options.bench:
-        return _run_bench(options)
+        return _run_bench(options, interrupts)
     size = _QUICK if options.quick else _FULL
-    dtypes = _parse_dtype(options.dtype or size.dtype)
+    dtypes = _parse_dtype(size.dtype if options.dtype is None else options.dtype)
     batches = _parse_batches(options.batch) if options.batch is not None else size.batches
     is_everything = not options.quick and options.methods is None
     plan = Plan(
@@ -97,14 +106,15 @@ def run(options: argparse.Namespace) -> int:
         dragon_input(size.clusters) if options.input is None else thinned(read_input(options.input), size.most_matrices)
     )
     environment = describe_environment(dtypes)
-    with measuring_configuration(), progress(number_of_steps(plan)) as advance:
+    with measuring_configuration(), progress(number_of_steps(plan), interrupts) as advance:
         measured = measure(plan, given, advance)
-    used = {name: str(value) for name, value in vars(options).items() if isinstance(value, str | int | Path)}
+    interrupts.hold()
+    used = {name: shown(value) for name, value in vars(options).items() if isinstance(value, str | int | Path)}
     content = Content(given, environment, used, dtypes, **measured._asdict())
     if before:
         sets = {name: len(part) for name, part in given.sets.items()}
-        content = content._replace(comparison=compare(options.compare.name, before, measured.results, sets))
-    pictures = draw_pictures(content)
+        content = content._replace(comparison=compare(shown(options.compare.name), before, measured.results, sets))
+    pictures = _draw(content, interrupts)
     markdown = document.as_report_markdown(content, pictures)
     files = {
         "report.md": markdown.encode(),
@@ -114,33 +124,44 @@ def run(options: argparse.Namespace) -> int:
         **pictures,
     }
     write_files(options.out, files)
-    print(document.as_terminal_text(content))
-    print(f"\nWritten to {options.out}: {', '.join(files)}")
-    return 0
+    parts = [document.as_terminal_text(content)]
+    if not pictures:
+        parts.append("Interrupted while drawing, without pictures.")
+    parts.append(f"Written to {shown(options.out)}: {', '.join(files)}")
+    show("\n\n".join(parts), options.out)
+    return 0 if pictures else INTERRUPTED
 
 
-def _run_bench(options: argparse.Namespace) -> int:
+def _draw(content: Content, interrupts: Interrupts) -> dict[str, bytes]:
+    """The pictures, or none if a Ctrl-C came before all were drawn."""
+    with contextlib.suppress(KeyboardInterrupt), interrupts.raising():
+        return draw_pictures(content)
+    return {}
+
+
+def _run_bench(options: argparse.Namespace, interrupts: Interrupts) -> int:
     fixed = ("input", "methods", "dtype", "batch", "peers", "compare")
     for name in fixed:
-        if getattr(options, name):
+        if getattr(options, name) not in (None, False):
             raise UserError(f"--bench measures a fixed list; it goes without {', '.join(f'--{x}' for x in fixed)}")
     check_writable(options.out)
     environment = describe_environment(("float32", "float64"))
-    with measuring_configuration(), progress(len(bench.GROUPS)) as advance:
+    with measuring_configuration(), progress(len(bench.GROUPS), interrupts) as advance:
         measured = bench.run_bench(_QUICK_BENCH if options.quick else bench.Size(), advance)
+    interrupts.hold()
     files = {
         "bench.md": bench_document.as_bench_markdown(measured, environment).encode(),
         "bench.json": records.as_bench_json(measured, environment).encode(),
     }
     write_files(options.out, files)
-    print(bench_document.as_bench_text(measured, environment))
-    print(f"\nWritten to {options.out}: {', '.join(files)}")
+    text = bench_document.as_bench_text(measured, environment)
+    show(f"{text}\n\nWritten to {shown(options.out)}: {', '.join(files)}", options.out)
     return 0
 
 
 def _parse_dtype(word: str) -> tuple[str, ...]:
     if word not in _DTYPES:
-        raise UserError(f"--dtype {word}: expected one of {', '.join(_DTYPES)}")
+        raise UserError(f"--dtype {shown(word)}: expected one of {', '.join(_DTYPES)}")
     return _DTYPES[word]
 
 
@@ -149,7 +170,7 @@ def _parse_methods(words: str) -> tuple[str, ...]:
     unknown = [name for name in names if name not in jaxrot.METHODS]
     if unknown:
         listed = ", ".join(repr(name) for name in unknown)
-        raise UserError(f"--methods {words}: unknown {listed}; expected some of {', '.join(jaxrot.METHODS)}")
+        raise UserError(f"--methods {shown(words)}: unknown {listed}; expected some of {', '.join(jaxrot.METHODS)}")
     return names
 
 
@@ -158,7 +179,7 @@ def _parse_batches(words: str) -> tuple[int, ...]:
     try:
         batches = sorted({int(word) for word in words.split(",")})
     except ValueError:
-        raise UserError(f"--batch {words}: {expected}") from None
+        raise UserError(f"--batch {shown(words)}: {expected}") from None
     if not 1 <= batches[0] <= batches[-1] <= _LARGEST_BATCH:
-        raise UserError(f"--batch {words}: {expected}")
+        raise UserError(f"--batch {shown(words)}: {expected}")
     return tuple(batches)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxrot.console.errors import UserError
+from jaxrot.console.errors import UserError, shown
 from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.measuring.timing import Timing
 from jaxrot.report.measurement import WHOLE, Results
@@ -95,9 +95,9 @@ def read_report(path: Path) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "it is no text"
-        raise UserError(f"--compare {path}: cannot be read ({reason}); {EXPECTED}") from None
+        raise UserError(f"--compare {shown(path)}: cannot be read ({reason}); {EXPECTED}") from None
     except json.JSONDecodeError:
-        raise UserError(f"--compare {path}: this is no JSON; {EXPECTED}") from None
+        raise UserError(f"--compare {shown(path)}: this is no JSON; {EXPECTED}") from None
     try:
         for entry in content["timing"]:
             Timing(**entry)
@@ -108,7 +108,7 @@ def read_report(path: Path) -> dict[str, Any]:
     except (KeyError, TypeError):
         is_report = False
     if not is_report:
-        raise UserError(f"--compare {path}: holds no report; {EXPECTED}")
+        raise UserError(f"--compare {shown(path)}: holds no report; {EXPECTED}")
     return content
 
 

@@ -1,16 +1,21 @@
 """What the report measures on: the dragon, or the user's own file, as named sets of matrices."""
 
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
 
-from jaxrot.console.errors import UserError
+from jaxrot._inputs import layout_hint
+from jaxrot.console.errors import UserError, shown
 from jaxrot.families import FAMILIES
 from jaxrot.report import deformed_dragon
 
+# What NumPy says when it must not unpickle an array.
+_OBJECTS = "Object arrays cannot be loaded"
+_OBJECTS_REFUSED = "dtype object, which holds Python objects; save array.astype(numpy.float64) instead"
 EXPECTED = "expected a .npy or .npz file with a real array of shape (..., 3, 3)"
 
 
@@ -58,21 +63,23 @@ def read_input(path: Path, option: str = "--input") -> Input:
         UserError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
             non-empty array of shape (..., 3, 3).
     """
+    name = f"{option} {shown(path)}"
     if not path.is_file():
-        raise UserError(f"{option} {path}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
-    arrays = _load(path, option)
+        raise UserError(f"{name}: {'not a file' if path.exists() else 'no such file'}; {EXPECTED}")
+    arrays = _load(path, name)
     if isinstance(arrays, np.ndarray):
         if (problem := _problem(arrays)) is not None:
-            raise UserError(f"{option} {path}: {problem}; {EXPECTED}")
-        return Input(path.name, {path.stem: _flat(arrays)}, dtype=_dtype([arrays]))
-    problems = {name: _problem(array) for name, array in arrays.items()}
-    sets = {name: _flat(arrays[name]) for name, problem in problems.items() if problem is None}
-    left_out = [f"{name} ({problem})" for name, problem in problems.items() if problem is not None]
-    if not sets:
+            raise UserError(f"{name}: {problem}; {EXPECTED}")
+        return Input(shown(path.name), {shown(path.stem): _flat(arrays)}, dtype=_dtype([arrays]))
+    problems = {part: _problem(array) for part, array in arrays.items()}
+    good = {part: array for part, array in arrays.items() if isinstance(array, np.ndarray) and problems[part] is None}
+    left_out = [f"{shown(part)} ({problem})" for part, problem in problems.items() if problem is not None]
+    if not good:
         held = ", ".join(left_out) if left_out else "nothing"
-        raise UserError(f"{option} {path}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
+        raise UserError(f"{name}: no array of shape (..., 3, 3) in it, it holds {held}; {EXPECTED}")
     remarks = (f"Left out of the file: {', '.join(left_out)}.",) if left_out else ()
-    return Input(path.name, sets, remarks, _dtype([arrays[name] for name in sets]))
+    sets = {shown(part): _flat(array) for part, array in good.items()}
+    return Input(shown(path.name), sets, remarks, _dtype(list(good.values())))
 
 
 def thinned(given: Input, most: int) -> Input:
@@ -90,31 +97,54 @@ def thinned(given: Input, most: int) -> Input:
     return given._replace(sets=sets, remarks=(*given.remarks, remark))
 
 
-def _load(path: Path, option: str) -> np.ndarray | dict[str, np.ndarray]:
+def _load(path: Path, name: str) -> np.ndarray | dict[str, np.ndarray | str]:
+    """The array in the file or, of an archive, all arrays; instead of one that cannot be read, why that is."""
     # Pickle would run code out of the file; an object array is refused instead. The file is opened here because
     # `np.load` leaves that of a torn archive open.
     try:
         with path.open("rb") as file:
             loaded = np.load(file, allow_pickle=False)
-            return loaded if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
+            return loaded if isinstance(loaded, np.ndarray) else {part: _member(loaded, part) for part in loaded.files}
     except (OSError, ValueError, EOFError, SyntaxError, RuntimeError, MemoryError, BadZipFile, zlib.error) as error:
         reason = " ".join(str(error).split())
-        if "allow_pickle" in reason or "pickled" in reason:
-            reason = "it holds Python objects or is no NumPy file"
-        raise UserError(f"{option} {path}: cannot be read ({reason}); {EXPECTED}") from None
+        if reason.startswith(_OBJECTS):
+            reason = _OBJECTS_REFUSED
+        elif "allow_pickle" in reason or "pickled" in reason:
+            reason = "it is no NumPy file"
+        raise UserError(f"{name}: cannot be read ({reason}); {EXPECTED}") from None
 
 
-def _problem(array: np.ndarray) -> str | None:
+def _member(archive: Mapping[str, np.ndarray], part: str) -> np.ndarray | str:
+    try:
+        return archive[part]
+    except ValueError as error:
+        if str(error).startswith(_OBJECTS):
+            return _OBJECTS_REFUSED
+        raise
+
+
+def _problem(array: np.ndarray | str) -> str | None:
     """Why an array cannot be measured on, or None."""
+    if isinstance(array, str):
+        return array
     if not isinstance(array, np.ndarray):
         return "no NumPy array"
     if array.shape[-2:] != (3, 3):
-        return f"shape {array.shape}"
-    if array.dtype.kind not in "fiub":
-        return f"dtype {array.dtype}"
+        return f"shape {array.shape}{layout_hint(array.shape)}"
+    # Of the floating dtypes only long double is wider than float64. Its digits would be lost without a word.
+    if array.dtype.kind not in "fiub" or (array.dtype.kind == "f" and array.dtype.itemsize > 8):
+        return f"dtype {array.dtype}; save {_conversion(array.dtype)} instead"
     if array.size == 0:
         return f"empty, shape {array.shape}"
     return None
+
+
+def _conversion(dtype: np.dtype) -> str:
+    if dtype.kind == "c":
+        return "array.real.astype(numpy.float64)"
+    if dtype.names is not None:
+        return "numpy.lib.recfunctions.structured_to_unstructured(array, numpy.float64)"
+    return "array.astype(numpy.float64)"
 
 
 def _flat(array: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jaxrot.scenes.clusters import incidence, padded, two_scale_clusters
+from jaxrot.scenes.scene import LARGEST_COORDINATE
 
 
 class Body(NamedTuple):
@@ -111,6 +112,10 @@ def checked_vertices(vertices: ArrayLike, name: str = "vertices") -> np.ndarray:
     bad = np.flatnonzero(~np.isfinite(checked).all(axis=1))
     if len(bad):
         raise ValueError(f"{name} must be finite; vertex {bad[0]} is {checked[bad[0]].tolist()}")
+    if np.abs(checked).max() > LARGEST_COORDINATE:
+        raise ValueError(
+            f"{name} must be at most {LARGEST_COORDINATE:g} from the origin; got {np.abs(checked).max():.3g}"
+        )
     return checked
 
 

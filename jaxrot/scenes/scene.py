@@ -6,6 +6,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+# Of a vertex, in any unit: volumes of larger bodies would overflow in float64, and LAPACK may hang on an infinity.
+LARGEST_COORDINATE = 1e100
+
 State = Any  # a NamedTuple of arrays, the scene's own
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot.scenes import mesh_file
+from jaxrot.scenes.scene import LARGEST_COORDINATE
 
 _CORNERS = 4
 
@@ -64,8 +65,8 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
     """The mesh with every tetrahedron turned so that its volume is positive.
 
     Raises:
-        ValueError: No tetrahedra, wrong shapes, an index of no vertex, a vertex that is not finite or belongs to no
-            tetrahedron, a flat tetrahedron.
+        ValueError: No tetrahedra, wrong shapes, an index of no vertex, a vertex that is not finite, too far away or of
+            no tetrahedron, a flat tetrahedron.
     """
     vertices, tetrahedra = np.asarray(vertices), np.asarray(tetrahedra)
     if tetrahedra.size == 0:
@@ -79,6 +80,9 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
     if not np.isfinite(vertices).all():
         index = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
         raise ValueError(f"vertex {index} is not finite: {vertices[index].tolist()}")
+    largest = np.abs(vertices).max()
+    if largest > LARGEST_COORDINATE:
+        raise ValueError(f"vertices must be at most {LARGEST_COORDINATE:g} from the origin; got {largest:.3g}")
     if tetrahedra.min() < 0 or tetrahedra.max() >= len(vertices):
         raise ValueError(f"a tetrahedron names a vertex outside 0 to {len(vertices) - 1}")
     alone = np.setdiff1d(np.arange(len(vertices)), tetrahedra)

@@ -14,7 +14,7 @@ from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, rotation_gap
 from jaxrot._scaling import safe_sqrt
-from jaxrot.scenes.scene import Scene
+from jaxrot.scenes.scene import LARGEST_COORDINATE, Scene
 
 SPIKE = -0.66  # det F where Fig. 4 has its spike
 SLANT = 0.5 * float(np.arccos(-SPIKE))  # where the rotation turns fastest at that determinant, −cos 2θ
@@ -94,6 +94,8 @@ def build(
         raise ValueError(f"tip_path must have shape (frames, 3), one frame or more; got {path.shape}")
     if not (np.all(np.isfinite(vertices)) and np.all(np.isfinite(path))):
         raise ValueError("rest and tip_path must be finite; got NaN or inf")
+    if max(np.abs(vertices).max(), np.abs(path).max()) > LARGEST_COORDINATE:
+        raise ValueError(f"rest and tip_path must be at most {LARGEST_COORDINATE:g} from the origin")
     if matrix not in _MATRICES:
         raise ValueError(f"matrix must be one of {', '.join(_MATRICES)}; got {matrix!r}")
     edges = (vertices[1:] - vertices[0]).T

@@ -25,17 +25,20 @@ def draw_animation(recording: Recording, lines: np.ndarray, title: str) -> bytes
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 0.92), projection="3d")
     axes.set_axis_off()
     axes.view_init(elev=15, azim=-65)
-    _set_limits(axes, recording.points)
+    # In float64: the width of a body that has exploded may be beyond float32. For an infinity, unlike a NaN, Matplotlib
+    # would print a warning.
+    points = np.where(np.isfinite(recording.points), recording.points, np.nan).astype(np.float64)
+    _set_limits(axes, points)
     figure.text(0.5, 0.98, textwrap.fill(title, 60), ha="center", va="top", fontsize=11)
     clock = figure.text(0.02, 0.02, "", fontsize=10, family="monospace")
-    move = _lines(axes, lines) if len(lines) else _points(axes, recording.points.shape[1])
+    move = _lines(axes, lines) if len(lines) else _points(axes, points.shape[1])
 
     def frame(index: int) -> list[Any]:
-        move(recording.points[index])
+        move(points[index])
         clock.set_text(f"t = {recording.times[index]:.3g} s")
         return []
 
-    animation = FuncAnimation(figure, frame, frames=len(recording.points), init_func=lambda: [])
+    animation = FuncAnimation(figure, frame, frames=len(points), init_func=lambda: [])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
         animation.save(path, writer=PillowWriter(fps=_FRAMES_A_SECOND))
@@ -67,7 +70,10 @@ def _set_limits(axes: Any, points: np.ndarray) -> None:
     """One cube for all frames, as large as needed by all points but the few that fly away furthest."""
     finite = points[np.isfinite(points).all(axis=-1)]
     lower, upper = np.quantile(finite, [0.001, 0.999], axis=0) if len(finite) else (np.zeros(3), np.ones(3))
-    centre, half = (lower + upper) / 2, max(float(np.max(upper - lower)) / 2, np.finfo(np.float32).tiny)
+    centre = (lower + upper) / 2
+    # A cube of no width cannot be drawn.
+    smallest = max(np.finfo(np.float32).tiny, np.finfo(np.float32).eps * np.abs(centre).max())
+    half = max(float(np.max(upper - lower)) / 2, smallest)
     for set_limits, middle in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, strict=True):
         set_limits(middle - half, middle + half)
     axes.set_box_aspect((1, 1, 1), zoom=1.3)

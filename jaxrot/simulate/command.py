@@ -1,13 +1,19 @@
 """`python -m jaxrot simulate`: options, their checks, and the order of things."""
 
 import argparse
+import contextlib
 import json
+from collections.abc import Callable
 from pathlib import Path
 
+from jaxrot._startup import INTERRUPTED
+from jaxrot.console.arguments import path
 from jaxrot.console.environment import describe_environment
-from jaxrot.console.errors import UserError
+from jaxrot.console.errors import UserError, shown
 from jaxrot.console.extras import check_installed
+from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.output import check_writable, write_files
+from jaxrot.console.printing import show
 from jaxrot.console.progress import progress
 from jaxrot.scenes.scene import Scene
 from jaxrot.simulate.animation import draw_animation
@@ -17,6 +23,11 @@ from jaxrot.simulate.recording import Recording, record
 
 _FRAMES = 100
 _MOST_STEPS = 10**8
+# The slow one last.
+_PICTURES: dict[str, Callable[[Recording, Scene], bytes]] = {
+    "health.png": lambda recording, scene: draw_health(recording, scene.title),
+    "animation.gif": lambda recording, scene: draw_animation(recording, scene.lines, scene.title),
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,21 +37,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = "scenes:\n" + "\n".join(f"  {name:{width}}  {entry.summary}" for name, entry in SCENES.items())
     parser.add_argument("scene", metavar="SCENE", help="which scene, see below")
     parser.add_argument("--steps", metavar="N", help="how many steps (the scene's own choice)")
-    parser.add_argument("--mesh", type=Path, metavar="FILE", help="a mesh of your own, in a format that meshio reads")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write (jaxrot-SCENE/)")
+    parser.add_argument("--mesh", type=path, metavar="FILE", help="a mesh of your own, in a format that meshio reads")
+    parser.add_argument("--out", type=path, metavar="FOLDER", help="where to write (jaxrot-SCENE/)")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     """Runs the scene, draws it, writes and prints; the user's mistakes are found before anything is computed.
 
+    A Ctrl-C ends the steps, or the drawing. What is finished by then is written.
+
     Returns:
-        The exit status: 0; 130 where the run was interrupted, and what it had done was written.
+        The exit status: 0; 130 where the steps or the drawing was interrupted.
 
     Raises:
-        UserError: Something the user can mend.
+        UserError: Something the user can fix.
+        UnreadError: Nobody reads standard output; the files are written.
+        KeyboardInterrupt: The command was interrupted before the first step.
     """
     if options.scene not in SCENES:
-        raise UserError(f"unknown scene {options.scene}; expected one of {', '.join(SCENES)}")
+        raise UserError(f"unknown scene {shown(options.scene)}; expected one of {', '.join(SCENES)}")
     steps = None if options.steps is None else _parse_steps(options.steps)
     folder = options.out or Path(f"jaxrot-{options.scene}")
     check_installed(["matplotlib"], "scenes")
@@ -48,21 +63,37 @@ def run(options: argparse.Namespace) -> int:
     scene = _build(options.scene, options.mesh)
     steps = scene.steps if steps is None else steps
     environment = describe_environment(("float32",))
-    with progress(min(steps, _FRAMES) + 1) as advance:
-        recording = record(scene, steps, _FRAMES, advance)
-        advance("drawing")
-        files = {
-            "animation.gif": draw_animation(recording, scene.lines, scene.title),
-            "health.png": draw_health(recording, scene.title),
-            "health.csv": as_csv(recording).encode(),
-            "run.json": json.dumps(_summary(options.scene, recording, environment), indent=2).encode(),
-        }
+    with progress(min(steps, _FRAMES) + 1, interrupts) as advance:
+        recording = record(scene, steps, _FRAMES, advance, interrupts)
+        pictures = _draw(scene, recording, advance, interrupts)
+    files = {
+        **pictures,
+        "health.csv": as_csv(recording).encode(),
+        "run.json": json.dumps(_summary(options.scene, recording, environment), indent=2).encode(),
+    }
     write_files(folder, files)
-    print(_text(scene, recording))
+    parts = [_text(scene, recording)]
     if recording.steps < steps:
-        print(f"\nInterrupted after {recording.steps:,} of {steps:,} steps.")
-    print(f"\nWritten to {folder}: {', '.join(files)}")
-    return 0 if recording.steps == steps else 130
+        parts.append(f"Interrupted after {recording.steps:,} of {steps:,} steps.")
+    if len(pictures) < len(_PICTURES):
+        left_out = " and ".join(name for name in _PICTURES if name not in pictures)
+        parts.append(f"Interrupted while drawing, without {left_out}.")
+    parts.append(f"Written to {shown(folder)}: {', '.join(files)}")
+    show("\n\n".join(parts), folder)
+    return 0 if recording.steps == steps and len(pictures) == len(_PICTURES) else INTERRUPTED
+
+
+def _draw(
+    scene: Scene, recording: Recording, advance: Callable[[str], None], interrupts: Interrupts
+) -> dict[str, bytes]:
+    """The pictures, or those that were finished before a Ctrl-C."""
+    pictures: dict[str, bytes] = {}
+    with contextlib.suppress(KeyboardInterrupt), interrupts.raising():
+        advance("drawing")
+        for name, draw in _PICTURES.items():
+            pictures[name] = draw(recording, scene)
+            interrupts.check()
+    return pictures
 
 
 def _build(name: str, mesh: Path | None) -> Scene:
@@ -71,11 +102,11 @@ def _build(name: str, mesh: Path | None) -> Scene:
         return entry.build()
     if entry.read_mesh is None:
         able = ", ".join(name for name, entry in SCENES.items() if entry.read_mesh is not None)
-        raise UserError(f"--mesh {mesh}: {name} takes no mesh; expected one of {able}")
+        raise UserError(f"--mesh {shown(mesh)}: {name} takes no mesh; expected one of {able}")
     try:
         return entry.build(entry.read_mesh(mesh))
     except ValueError as error:
-        raise UserError(f"--mesh {mesh}: {error}") from None
+        raise UserError(f"--mesh {shown(mesh)}: {error}") from None
 
 
 def _parse_steps(word: str) -> int:
@@ -84,7 +115,7 @@ def _parse_steps(word: str) -> int:
     except ValueError:
         steps = 0
     if not 1 <= steps <= _MOST_STEPS:
-        raise UserError(f"--steps {word}: expected a whole number from 1 to {_MOST_STEPS:,}")
+        raise UserError(f"--steps {shown(word)}: expected a whole number from 1 to {_MOST_STEPS:,}")
     return steps
 
 

@@ -1,5 +1,6 @@
 """Running a scene: frames and health at equal distances in time, and how long the steps alone took."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,7 +8,21 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from jaxrot.console.interrupts import Interrupts
 from jaxrot.scenes.scene import Scene, State
+
+# XLA does not return before a call is done, and Python sees a Ctrl-C only then.
+_CALL_S = 0.3
+_MOST_STEPS_A_CALL = 10**6
+
+
+class _Frame(NamedTuple):
+    """What was seen after `made` steps, which took so many seconds."""
+
+    made: int
+    seconds: float
+    points: np.ndarray
+    health: list[np.ndarray]
 
 
 class Recording(NamedTuple):
@@ -30,7 +45,9 @@ class Recording(NamedTuple):
     compile_seconds: float
 
 
-def record(scene: Scene, steps: int, frames: int, advance: Callable[[str], None]) -> Recording:
+def record(
+    scene: Scene, steps: int, frames: int, advance: Callable[[str], None], interrupts: Interrupts | None = None
+) -> Recording:
     """Makes the steps, or as many as there are until the user interrupts.
 
     Args:
@@ -38,10 +55,15 @@ def record(scene: Scene, steps: int, frames: int, advance: Callable[[str], None]
         steps: How many steps, at least 1.
         frames: About how many pictures of them, at least 1.
         advance: Called before each stretch between two frames, with what is done.
+        interrupts: Ctrl-C; held from the first step on.
 
     Returns:
         The recording; `steps` is smaller than asked where it was interrupted.
+
+    Raises:
+        KeyboardInterrupt: No step was made before the interruption.
     """
+    interrupts = interrupts or Interrupts()
     stretch = -(-steps // min(frames, steps))
     begun = time.perf_counter()
     # The number of steps is an argument: the last stretch may be shorter, and needs no program of its own.
@@ -56,29 +78,48 @@ def record(scene: Scene, steps: int, frames: int, advance: Callable[[str], None]
         names[:] = health
         return scene.points(state), list(health.values())
 
-    seen, made = [jax.device_get(look(scene.state))], [0]
-    compile_seconds, seconds = time.perf_counter() - begun, 0.0
-    state = scene.state
-    try:
-        while made[-1] < steps:
-            advance(f"step {made[-1]:,} of {steps:,}")
-            count = min(stretch, steps - made[-1])
-            state, took = _timed(run, state, count)
-            frame = jax.device_get(look(state))
-            seen, made, seconds = [*seen, frame], [*made, made[-1] + count], seconds + took
-    except KeyboardInterrupt:
-        pass
+    points, health = jax.device_get(look(scene.state))
+    seen = [_Frame(0, 0.0, points, health)]
+    compile_seconds = time.perf_counter() - begun
+    interrupts.hold()
+    state, calls = scene.state, _Calls(run, interrupts)
+    with contextlib.suppress(KeyboardInterrupt):
+        while seen[-1].made < steps:
+            made, seconds = seen[-1].made, seen[-1].seconds
+            advance(f"step {made:,} of {steps:,}")
+            interrupts.check()
+            state, count, took = calls.make(state, min(stretch, steps - made))
+            points, health = jax.device_get(look(state))
+            seen.append(_Frame(made + count, seconds + took, points, health))
+    interrupts.forget()
+    if not seen[-1].made:
+        raise KeyboardInterrupt
     return Recording(
-        times=scene.step_seconds * np.array(made),
-        points=np.stack([points for points, _ in seen]),
-        health={name: np.array([float(health[index]) for _, health in seen]) for index, name in enumerate(names)},
-        steps=made[-1],
-        seconds=seconds,
+        times=scene.step_seconds * np.array([frame.made for frame in seen]),
+        points=np.stack([frame.points for frame in seen]),
+        health={name: np.array([float(frame.health[index]) for frame in seen]) for index, name in enumerate(names)},
+        steps=seen[-1].made,
+        seconds=seen[-1].seconds,
         compile_seconds=compile_seconds,
     )
 
 
-def _timed(run: Callable[[State, int], State], state: State, count: int) -> tuple[State, float]:
-    begun = time.perf_counter()
-    state = jax.block_until_ready(run(state, count))
-    return state, time.perf_counter() - begun
+class _Calls:
+    """Calls of the compiled steps, none so long that a Ctrl-C has to wait for its end."""
+
+    def __init__(self, run: Callable[[State, int], State], interrupts: Interrupts) -> None:
+        self._run, self._interrupts = run, interrupts
+        self._count = 1
+
+    def make(self, state: State, count: int) -> tuple[State, int, float]:
+        """The state after these steps or, after a Ctrl-C, after some of them; their number, and the seconds."""
+        made, seconds = 0, 0.0
+        while True:
+            some = min(self._count, count - made)
+            begun = time.perf_counter()
+            state = jax.block_until_ready(self._run(state, some))
+            took = time.perf_counter() - begun
+            made, seconds = made + some, seconds + took
+            if made == count or self._interrupts.pending:
+                return state, made, seconds
+            self._count = max(1, min(_MOST_STEPS_A_CALL, round(some * _CALL_S / max(took, 1e-9))))

@@ -104,7 +104,7 @@ def _refused(words, capsys):
         (["{good}", "--tolerance", "inf"], "expected a number > 0"),
         (["{good}", "--tolerance", "1e-3", "--dtype", "float16"], "--dtype float16: expected one of float32, float64"),
         (["{folder}/none.npy", "--tolerance", "1e-3"], "FILE {folder}/none.npy: no such file; expected a .npy or .npz"),
-        (["{folder}/flat.npy", "--tolerance", "1e-3"], "FILE {folder}/flat.npy: shape (3, 4); expected"),
+        (["{folder}/flat.npy", "--tolerance", "1e-3"], "FILE {folder}/flat.npy: shape (3, 5); expected"),
         (["{folder}/nan.npy", "--tolerance", "1e-3"], "must hold a finite one"),
         (["{good}", "--tolerance", "1e-3", "--previous", "{folder}/none.npy"], "--previous {folder}/none.npy: no such"),
         (["{good}", "--tolerance", "1e-3", "--previous", "{folder}/nan.npy"], "nan.npy: 2 rotations; expected 20"),
@@ -118,7 +118,7 @@ def _refused(words, capsys):
 )
 def test_a_mistake_is_refused_in_one_line(words, expected, tmp_path, inverted, capsys, monkeypatch):
     monkeypatch.setattr(_candidates, "compile_method", lambda *arguments, **options: pytest.fail("measured"))
-    np.save(tmp_path / "flat.npy", np.ones((3, 4)))
+    np.save(tmp_path / "flat.npy", np.ones((3, 5)))
     np.save(tmp_path / "nan.npy", np.full((2, 3, 3), np.nan))
     np.savez(tmp_path / "ab.npz", a=np.eye(3), b=np.eye(3))
     places = {"good": tmp_path / "inverted.npy", "folder": tmp_path}

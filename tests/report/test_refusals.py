@@ -136,7 +136,7 @@ def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, caps
         raise PermissionError(13, "Permission denied")
 
     # Permission bits do not stop an administrator, and the tests may be run by one.
-    monkeypatch.setattr("jaxrot.console.output.tempfile.mkdtemp", refuse)
+    monkeypatch.setattr("jaxrot.console.output.tempfile.TemporaryFile", refuse)
     monkeypatch.setattr(command, "measure", lambda *arguments: pytest.fail("measured"))
     assert "permission denied" in _refused(["report", "--out", tmp_path / "out"], capsys)
 

@@ -8,8 +8,9 @@ import pytest
 from jaxrot.__main__ import main
 from jaxrot.scenes.scene import Scene
 from jaxrot.simulate import command, health
+from jaxrot.simulate.animation import draw_animation
 from jaxrot.simulate.catalogue import SCENES, Entry
-from jaxrot.simulate.recording import record
+from jaxrot.simulate.recording import Recording, record
 
 FILES = ["animation.gif", "health.csv", "health.png", "run.json"]
 SILENT = lambda step: None  # noqa: E731
@@ -75,7 +76,7 @@ def test_a_run_writes_its_files_and_prints_its_health(only_falling, tmp_path, ca
 
 def test_an_interrupted_run_leaves_what_it_had_finished(only_falling, tmp_path, capsys, monkeypatch):
     @contextlib.contextmanager
-    def impatient(steps):
+    def impatient(steps, interrupts):
         calls = []
 
         def advance(step):
@@ -127,6 +128,13 @@ def test_the_help_lists_every_scene(capsys):
         main(["simulate", "--help"])
     printed = capsys.readouterr().out
     assert all(f"  {name} " in printed for name in SCENES)
+
+
+@pytest.mark.parametrize("points", [[[-3e38, 0, 0], [3e38, 1, 0], [0, 0, np.inf]], [[3, 0, 0]]], ids=["wide", "point"])
+def test_a_body_of_any_width_is_drawn(points):
+    recording = Recording(np.zeros(1), np.array([points], np.float32), {"size (m)": np.array([np.inf])}, 1, 1.0, 1.0)
+    assert draw_animation(recording, np.empty((0, 2), dtype=np.intp), "Body")[:6] == b"GIF89a"
+    assert health.draw_health(recording, "Body")[1:4] == b"PNG"
 
 
 @pytest.mark.exhaustive

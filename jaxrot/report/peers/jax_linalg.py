@@ -43,13 +43,18 @@ def eigh(dtype: str) -> Peer:
             [d - b, c + g, f + h, i - a - e],
         ]
         davenport = jnp.stack([jnp.stack(row, -1) for row in rows], -2)
-        w, x, y, z = jnp.moveaxis(jnp.linalg.eigh(davenport)[1][..., -1], -1, 0)
+        # The sums overflow where A is near the largest number, and LAPACK may never return from an infinity.
+        is_finite = jnp.isfinite(davenport).all(axis=(-2, -1), keepdims=True)
+        safe = jnp.where(is_finite, davenport, jnp.zeros_like(davenport))
+        w, x, y, z = jnp.moveaxis(jnp.linalg.eigh(safe)[1][..., -1], -1, 0)
         columns = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
-        return jnp.stack([jnp.stack(row, -1) for row in columns], -2)
+        # There the value and, because of the factor A, its derivative are NaN.
+        nan = jnp.where(is_finite, jnp.zeros_like(matrix), jnp.full_like(matrix, jnp.nan))
+        return jnp.stack([jnp.stack(row, -1) for row in columns], -2) + nan * matrix
 
     return in_jax(rotation, dtype)
 

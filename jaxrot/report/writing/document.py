@@ -81,7 +81,7 @@ def as_report_markdown(content: Content, pictures: Mapping[str, bytes]) -> str:
     parts = [f"# Error against run time: {content.given.name}", _machine(content), *findings(content)]
     if content.comparison is not None:
         parts.append(compared_sentence(content.comparison))
-    parts.append("## Pictures")
+    parts += ["## Pictures"] if pictures else []
     for name in pictures:
         first_sentence = " ".join(_CAPTIONS[name].split()).split(". ")[0]
         parts += [f"![{first_sentence}]({name})", _CAPTIONS[name]]
