@@ -27,7 +27,7 @@ class Computing(NamedTuple):
     dtype: np.dtype
 
 
-def check_array(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...], hint: str = "") -> Array:
+def check_array(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...]) -> Array:
     """Returns a numeric array of shape (..., *trailing_shape), or raises an error that names the argument.
 
     Raises:
@@ -37,7 +37,10 @@ def check_array(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...],
     expected = f"{name} must be a real array of shape (..., {', '.join(map(str, trailing_shape))})"
     array = _as_array(argument, name, expected)
     if array.shape[-len(trailing_shape) :] != trailing_shape:
-        raise ValueError(f"{expected}; got shape {array.shape}{hint if array.shape[:2] == trailing_shape else ''}")
+        hint = layout_hint(array.shape) if trailing_shape == (3, 3) else ""
+        if array.shape[:2] == trailing_shape == (3, 3):
+            hint += ", or jax.vmap(function, in_axes=-1, out_axes=-1)"
+        raise ValueError(f"{expected}; got shape {array.shape}{hint}")
     _computing_dtype(array.dtype, expected)
     return array
 
@@ -90,8 +93,7 @@ def check_matrix(matrix: ArrayLike, name: str = "matrix") -> Array:
         ValueError: The last two axes are not (3, 3).
         TypeError: The dtype is not real, or jaxrot does not compute in it.
     """
-    hint = "; if the batch axes trail, use jax.vmap(f, in_axes=-1, out_axes=-1)"
-    return check_array(matrix, name, (3, 3), hint)
+    return check_array(matrix, name, (3, 3))
 
 
 def check_start(start: ArrayLike, name: str, trailing_shape: tuple[int, ...], matrix: Array) -> Array:

@@ -72,6 +72,24 @@ def test_a_symbolic_batch_goes_through_at_once():
     np.testing.assert_allclose(exported.call(A), nearest(A), atol=1e-14)
 
 
+@pytest.mark.parametrize("size", [1.5, True, "3", None])
+def test_a_size_that_is_no_integer_is_refused(size):
+    with pytest.raises(TypeError, match="size must be a static Python integer"):
+        in_blocks(nearest, size)
+
+
+def test_what_cannot_be_split_is_refused_in_words():
+    blocks = in_blocks(nearest, 2)
+    with pytest.raises(TypeError, match=r"takes arrays, .* got float: convert lists by jax.numpy.asarray"):
+        blocks([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])
+    with pytest.raises(TypeError, match="at least one positional array"):
+        blocks(matrix=A)
+    with pytest.raises(ValueError, match="same first axis; got shapes"):
+        in_blocks(refine_rotation, 2)(A, A[:3])
+    with pytest.raises(ValueError, match="same first axis"):
+        blocks(np.ones(()))
+
+
 @pytest.mark.parametrize("size", [0, -1])
 def test_a_size_that_is_not_positive_is_refused(size):
     with pytest.raises(ValueError, match=f"size must be >= 1 and .*; got {size}"):

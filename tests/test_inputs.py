@@ -1,4 +1,5 @@
 import functools
+import re
 
 import jax
 import jax.numpy as jnp
@@ -66,6 +67,42 @@ def test_integers_become_the_default_float(function, dtype):
     result = function(integers)
     assert result.dtype == np.float64
     np.testing.assert_array_equal(result, function(integers.astype(np.float64)))
+
+
+@pytest.mark.parametrize(
+    ("shape", "code"), [((5, 4, 4), "array[..., :3, :3]"), ((5, 9), "reshape(-1, 3, 3)"), ((5, 12), "[..., :3]")]
+)
+def test_pose_files_get_the_line_that_converts_them(shape, code):
+    with pytest.raises(ValueError, match=re.escape(code)):
+        nearest_rotation(np.ones(shape))
+
+
+@pytest.mark.parametrize("dtype", [">f4", ">f8", ">i2"])
+def test_big_endian_arrays_are_converted(dtype):
+    big, native = A.astype(dtype), A.astype(dtype).astype(np.dtype(dtype).newbyteorder("="))
+    np.testing.assert_array_equal(nearest_rotation(big), nearest_rotation(native))
+    start = np.eye(3).astype(dtype)
+    np.testing.assert_array_equal(refine_rotation(native, start), refine_rotation(native, np.eye(3, dtype=np.float64)))
+
+
+@all_gates
+def test_long_double_is_refused_with_the_line_that_converts_it(function):
+    with pytest.raises(
+        TypeError, match=r"got dtype (float128|longdouble): convert it by matrix\.astype\(numpy\.float64"
+    ):
+        function(A.astype(np.longdouble))
+
+
+def test_numbers_beyond_every_dtype_are_refused_in_words():
+    with pytest.raises(TypeError, match="got an integer of more than 64 bits: pass floats"):
+        nearest_rotation([[2**70, 0, 0], [0, 1, 0], [0, 0, 1]])
+    for damping in (10**400, 10**5000):
+        with pytest.raises(ValueError, match="damping must be finite and >= 0; got inf"):
+            nearest_rotation(A, damping=damping)
+    with pytest.raises(ValueError, match=r"iterations must be >= 0 and < 2\*\*31; got 1000000000000"):
+        refine_rotation(A, np.eye(3), iterations=10**12)
+    with pytest.raises(ValueError, match="got an integer of more than 64 bits"):
+        refine_rotation(A, np.eye(3), iterations=10**5000)
 
 
 def test_lists_are_admitted():
