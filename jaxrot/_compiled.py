@@ -1,4 +1,4 @@
-"""One compiled program for each public function, also when the caller does not use `jit`."""
+"""What JAX has to know of public functions and records: one program for each, and names to export them by."""
 
 import functools
 import inspect
@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import jax
+from jax import export
 
 from jaxrot._inputs import computing
 
 _Result = TypeVar("_Result")
+_Record = TypeVar("_Record")
 
 
 def compiled(function: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -35,3 +37,9 @@ def compiled(function: Callable[..., _Result]) -> Callable[..., _Result]:
         return jax.tree.map(lambda x: x.astype(dtype), result)
 
     return run
+
+
+def exportable(record: type[_Record]) -> type[_Record]:
+    """Lets `jax.export` serialise functions that take or return this NamedTuple."""
+    rooms = [room for room in record.__module__.split(".") if not room.startswith("_")]
+    return export.register_namedtuple_serialization(record, serialized_name=".".join([*rooms, record.__name__]))

@@ -9,7 +9,7 @@ from jax.typing import ArrayLike
 
 from jaxrot import _mat3
 from jaxrot._choice import exchange
-from jaxrot._compiled import compiled
+from jaxrot._compiled import compiled, exportable
 from jaxrot._derivative import inverse_gap_matrix, stretch_tangent
 from jaxrot._inputs import check_choice, check_damping, check_flag, check_matrix
 from jaxrot._mat3 import Mat3, Vec3
@@ -20,6 +20,7 @@ from jaxrot._svd import decomposed, reciprocal_gaps
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
+@exportable
 class TwistModes(NamedTuple):
     """The eigenvectors of the Jacobian of R that are not in its null space.
 

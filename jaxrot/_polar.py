@@ -7,7 +7,7 @@ import jax
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
-from jaxrot._compiled import compiled
+from jaxrot._compiled import compiled, exportable
 from jaxrot._derivative import stretch_tangent
 from jaxrot._inputs import check_choice, check_matrix
 from jaxrot._nearest import nearest
@@ -15,6 +15,7 @@ from jaxrot._scaling import power_of_two, scaled
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
+@exportable
 class PolarDecomposition(NamedTuple):
     """A = R S.
 

@@ -1,13 +1,13 @@
 """The cheapest way to the nearest rotation that is accurate enough, measured on the user's own matrices."""
 
 from collections.abc import Callable
-from types import MappingProxyType
 
 import numpy as np
 from jax.typing import ArrayLike, DTypeLike
 
 from jaxrot import _candidates
 from jaxrot._candidates import Candidate, Measured
+from jaxrot._frozen import FrozenMapping
 from jaxrot._recommendation import Recommendation
 from jaxrot._sample import Sample, take_sample
 from jaxrot.solvers import METHODS
@@ -106,7 +106,7 @@ def recommend_step_by_step(
         undetermined=_candidates.undetermined(sample),
         runners_up=tuple(candidate for candidate in timed if candidate.name != chosen.name),
         too_inaccurate=tuple(errors),
-        excluded=MappingProxyType(excluded),
+        excluded=FrozenMapping(excluded),
     )
 
 

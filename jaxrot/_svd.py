@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
-from jaxrot._compiled import compiled
+from jaxrot._compiled import compiled, exportable
 from jaxrot._complex import Complex, multiply, reciprocal, square, times
 from jaxrot._derivative import resolved_gap
 from jaxrot._inputs import check_matrix
@@ -19,6 +19,7 @@ from jaxrot._symmetric import eigen
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
+@exportable
 class RotationVariantSVD(NamedTuple):
     """A = left · diag(singular_values) · rightᵀ.
 

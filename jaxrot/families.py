@@ -9,11 +9,12 @@ kappa = s1 / (s2 + s3), its condition number; eps = finfo(dtype).eps.
 
 import zlib
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from jaxrot._frozen import FrozenMapping
 
 LARGE_BATCH = 32_769  # jaxlib 0.10.2 on CPU gives wrong numbers for some fused reductions from here on (jax#39103)
 
@@ -23,10 +24,9 @@ class Sample(NamedTuple):
 
     Attributes:
         matrices: Shape (count, 3, 3), in the dtype asked for.
-        singular_values: Shape (count, 3), float64, signed. A prescribed spectrum is that of U diag(s) Vᵀ before its one
-            rounding to dtype, which moves it by at most 2 eps s1 (and the spacing of subnormals): a gap s2 + s3 below
-            that is the one intended. Others are LAPACK's, off by 18 float64 eps s1 at worst. For the rounded matrix to
-            the last digit see `jaxrot.measuring.reference`. NaN where a recipe gives NaN or an infinity.
+        singular_values: Shape (count, 3), float64, signed. A prescribed spectrum is that before the one rounding to
+            dtype, which moves it by at most 2 eps s1. Others are LAPACK's, off by 18 float64 eps s1 at worst, and NaN
+            where the matrix is not finite.
     """
 
     matrices: NDArray[np.floating]
@@ -95,15 +95,14 @@ class Family(NamedTuple):
 def half_turn_starts(rotations: ArrayLike, axes: ArrayLike | None = None) -> NDArray[np.floating]:
     """The starts from which an iteration on the torque does not move, half a turn away, and starts one ulp off them.
 
-    The torque vanishes at Q = R Rot(n, 180°) for each principal axis n of the stretch RᵀA. Off it, Q is turned by ±eps
-    about all three axes, some ulps. An ulp added to every entry would keep Q symmetric at A = 1, and the torque zero.
+    The torque vanishes at Q = R Rot(n, 180°) for each principal axis n of the stretch RᵀA.
 
     Args:
         rotations: The nearest rotations R, shape (..., 3, 3), float32 or float64.
         axes: The principal axes in the columns, shape (..., 3, 3). When absent those of A = R diag(s).
 
     Returns:
-        Shape (9, ..., 3, 3), the dtype of `rotations`: about each axis exactly 180°, then +eps, then -eps off.
+        Shape (9, ..., 3, 3): about each axis exactly 180°, then +eps, then -eps off about all three axes.
 
     Source: Müller et al. 2016, eq. (8) and below, which knows the maxima only; there are saddles among them.
     """
@@ -246,4 +245,4 @@ _RECIPES: dict[str, tuple[str, Callable[[_Draw], NDArray | tuple | Sample]]] = {
     "subnormal": ("every entry below the smallest normal number", _subnormal),
 }
 
-FAMILIES: Mapping[str, Family] = MappingProxyType({name: Family(name, *rest) for name, rest in _RECIPES.items()})
+FAMILIES: Mapping[str, Family] = FrozenMapping({name: Family(name, *rest) for name, rest in _RECIPES.items()})

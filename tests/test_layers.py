@@ -9,7 +9,18 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
-    {"_blocks", "_choice", "_complex", "_inputs", "_mat3", "_quaternion", "_scaling", "_startup", "families"},
+    {
+        "_blocks",
+        "_choice",
+        "_complex",
+        "_frozen",
+        "_inputs",
+        "_mat3",
+        "_quaternion",
+        "_scaling",
+        "_startup",
+        "families",
+    },
     {"_compiled", "_definite", "_jacobi", "_saturation", "_symmetric"},
     {"_derivative"},
     {"steps"},

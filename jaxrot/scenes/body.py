@@ -11,10 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
+from jaxrot._compiled import exportable
 from jaxrot.scenes.clusters import incidence, padded, two_scale_clusters
 from jaxrot.scenes.scene import LARGEST_COORDINATE
 
 
+@exportable
 class Body(NamedTuple):
     """A body of n vertices in c clusters of at most s vertices, each vertex in at most k clusters.
 

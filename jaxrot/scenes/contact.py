@@ -7,12 +7,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxrot._compiled import exportable
 from jaxrot._scaling import safe_divide, safe_sqrt
 
 # Lower and upper corner, each of three numbers.
 Corners = Sequence[Sequence[float]] | np.ndarray
 
 
+@exportable
 class Contact(NamedTuple):
     """What the points may touch, and how they answer.
 
@@ -31,6 +33,7 @@ class Contact(NamedTuple):
     friction: jax.Array
 
 
+@exportable
 class Motion(NamedTuple):
     """Points on the move: positions, m, and velocities, m/s, each of shape (n, 3)."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jaxrot import METHODS, STEPS
+from jaxrot._compiled import exportable
 from jaxrot.scenes import elasticity
 from jaxrot.scenes import tetrahedra as meshes
 from jaxrot.scenes.elasticity import Elements
@@ -22,6 +23,7 @@ INTEGRATORS = ("euler", "midpoint")
 TANGENTS = ("exact", "held", "projected")
 
 
+@exportable
 class State(NamedTuple):
     """What moves.
 
@@ -36,6 +38,7 @@ class State(NamedTuple):
     rotations: jax.Array
 
 
+@exportable
 class Parameters(NamedTuple):
     """What does not move.
 

@@ -13,6 +13,7 @@ from jax import lax
 from jax.typing import ArrayLike
 
 from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation, refine_rotation
+from jaxrot._compiled import exportable
 from jaxrot.scenes import cycles
 from jaxrot.scenes.cycles import Cycle
 from jaxrot.scenes.free_top import tumbling_rates
@@ -30,6 +31,7 @@ _PRODUCTS = 1000  # a frame of `drift`
 _MAGNIFIED = 50  # the deviation in its pictures: without repair it is a twentieth of the axes at the end
 
 
+@exportable
 class State(NamedTuple):
     """What turns: any number of bodies.
 
@@ -42,6 +44,7 @@ class State(NamedTuple):
     step_count: jax.Array
 
 
+@exportable
 class Parameters(NamedTuple):
     """How it turns: by a cycle of increments, over and over.
 

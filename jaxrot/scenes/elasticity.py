@@ -15,8 +15,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import nearest_rotation, refine_rotation, twist_modes
+from jaxrot._compiled import exportable
 
 
+@exportable
 class Elements(NamedTuple):
     """Linear tetrahedra.
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax import lax
 from jax.scipy.sparse.linalg import cg
 
+from jaxrot._compiled import exportable
 from jaxrot.scenes import elasticity
 from jaxrot.scenes.elasticity import Elements
 
@@ -24,6 +25,7 @@ class Choices(NamedTuple):
     tolerance: float = 1e-5
 
 
+@exportable
 class Problem(NamedTuple):
     """The potential ½ Σ c |u|² − uᵀf + E(x + u) of a displacement u.
 

@@ -12,11 +12,13 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation
+from jaxrot._compiled import exportable
 from jaxrot.scenes.balance import without_momentum
 from jaxrot.scenes.body import Body, checked_vertices
 from jaxrot.scenes.contact import Contact, Motion, build_contact, stand_on_ground, stay_in_box, stay_out_of_obstacle
 
 
+@exportable
 class State(NamedTuple):
     """What moves.
 
@@ -31,6 +33,7 @@ class State(NamedTuple):
     rotations: jax.Array
 
 
+@exportable
 class Parameters(NamedTuple):
     """What does not.
 
@@ -51,6 +54,7 @@ class Parameters(NamedTuple):
     contact: Contact
 
 
+@exportable
 class ClusterFit(NamedTuple):
     """How the clusters lie.
 

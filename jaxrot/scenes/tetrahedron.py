@@ -13,6 +13,7 @@ from jax import lax
 from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, rotation_gap
+from jaxrot._compiled import exportable
 from jaxrot._scaling import safe_sqrt
 from jaxrot.scenes.scene import LARGEST_COORDINATE, Scene
 
@@ -23,6 +24,7 @@ _MATRICES = ("deformation_gradient", "shape_matching")
 _FRAMES = 320
 
 
+@exportable
 class State(NamedTuple):
     """What moves.
 
@@ -35,6 +37,7 @@ class State(NamedTuple):
     frame: jax.Array
 
 
+@exportable
 class Parameters(NamedTuple):
     """What does not.
 

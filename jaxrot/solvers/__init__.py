@@ -1,11 +1,11 @@
 """Cold-start solvers, one algorithm a file, and their registry."""
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 import jax
 
+from jaxrot._frozen import FrozenMapping
 from jaxrot.solvers import (
     cayley,
     davenport,
@@ -53,13 +53,13 @@ class Method(NamedTuple):
 
 
 def _limit(float32: float, float64: float) -> Mapping[str, float]:
-    return MappingProxyType({"float32": float32, "float64": float64})
+    return FrozenMapping({"float32": float32, "float64": float64})
 
 
 # The fastest of the methods that keep the whole contract, singular, inverted and extreme matrices included.
 DEFAULT_METHOD = "half_turn"
 
-METHODS: Mapping[str, Method] = MappingProxyType(
+METHODS: Mapping[str, Method] = FrozenMapping(
     {
         "half_turn": Method(
             half_turn.solve, True, True, True, _limit(2.0**20, 2.0**49), "Markley 1993; Higham and Noferini 2016"

@@ -5,8 +5,10 @@ import jax.numpy as jnp
 
 from jaxrot import _mat3, _quaternion
 from jaxrot._scaling import unit_scaled
+from jaxrot.solvers._lapack import finite_only
 
 
+@finite_only
 def solve(matrix: jax.Array) -> jax.Array:
     """The rotation of the eigenvector of the 4×4 matrix 1 + N(A) for its *algebraically* largest eigenvalue.
 

@@ -4,7 +4,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from jaxrot.solvers._lapack import finite_only
 
+
+@finite_only
 def solve(matrix: jax.Array) -> jax.Array:
     """The nearest rotation U diag(1, 1, det UVᵀ) Vᵀ.
 

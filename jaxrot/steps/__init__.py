@@ -1,9 +1,9 @@
 """Warm-start steps, one a file, and their registry."""
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
+from jaxrot._frozen import FrozenMapping
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
 from jaxrot.steps import cayley, newton, quest, torque, torque_exact_angle
@@ -23,7 +23,7 @@ class Step(NamedTuple):
     source: str
 
 
-STEPS: Mapping[str, Step] = MappingProxyType(
+STEPS: Mapping[str, Step] = FrozenMapping(
     {
         "torque": Step(torque.correction, "linear, max|sᵢ| / |Σsᵢ|", "Müller et al. 2016, eq. (7)"),
         "torque_exact_angle": Step(
