@@ -8,6 +8,8 @@ from jaxrot._dense import TwistModes as TwistModes
 from jaxrot._dense import arap_hessian as arap_hessian
 from jaxrot._dense import rotation_jacobian as rotation_jacobian
 from jaxrot._dense import twist_modes as twist_modes
+from jaxrot._isotropic import isotropic_energy as isotropic_energy
+from jaxrot._isotropic import isotropic_map as isotropic_map
 from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
 from jaxrot._polar import PolarDecomposition as PolarDecomposition
@@ -40,6 +42,8 @@ __all__ = [
     "arap_hessian",
     "families",
     "in_blocks",
+    "isotropic_energy",
+    "isotropic_map",
     "nearest_quaternion_wxyz",
     "nearest_rotation",
     "polar_decomposition",

@@ -12,6 +12,7 @@ from jax import lax
 from jax.sharding import NamedSharding, reshard
 from jax.sharding import PartitionSpec as P
 
+from jaxrot._compiled import ByIdentity
 from jaxrot._inputs import check_integer
 
 _P = ParamSpec("_P")
@@ -50,7 +51,7 @@ def in_blocks(function: Callable[_P, _Result], size: int = 65_536) -> Callable[_
 
 @dataclasses.dataclass(frozen=True)
 class _InBlocks(Generic[_P, _Result]):
-    """A function in blocks; two of the same function and size are equal, and share their compiled programs."""
+    """A function in blocks; two of the same function and size share their compiled programs."""
 
     function: Callable[_P, _Result]
     size: int
@@ -61,15 +62,17 @@ class _InBlocks(Generic[_P, _Result]):
         is_array = tuple(isinstance(leaf, jax.Array | np.ndarray) for leaf in leaves)
         arrays = [leaf for leaf, traced in zip(leaves, is_array, strict=True) if traced]
         options = tuple(leaf for leaf, traced in zip(leaves, is_array, strict=True) if not traced)
-        return _compiled_call(self, structure, is_array, options, *arrays)
+        return _compiled_call(ByIdentity(self.function), self.size, structure, is_array, options, *arrays)
 
 
-@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3), inline=True)
-def _compiled_call(blocks: _InBlocks, structure, is_array: tuple[bool, ...], options: tuple[Hashable, ...], *arrays):
+@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3, 4), inline=True)
+def _compiled_call(
+    function: ByIdentity, size: int, structure, is_array: tuple[bool, ...], options: tuple[Hashable, ...], *arrays
+):
     remaining, static = iter(arrays), iter(options)
     leaves = [next(remaining) if traced else next(static) for traced in is_array]
     args, kwargs = jax.tree.unflatten(structure, leaves)
-    return _apply(lambda *rows: blocks.function(*rows, **kwargs), args, blocks.size)
+    return _apply(lambda *rows: function(*rows, **kwargs), args, size)
 
 
 def _apply(function: Callable, args: tuple, size: int) -> Any:

@@ -43,3 +43,22 @@ def exportable(record: type[_Record]) -> type[_Record]:
     """Lets `jax.export` serialise functions that take or return this NamedTuple."""
     rooms = [room for room in record.__module__.split(".") if not room.startswith("_")]
     return export.register_namedtuple_serialization(record, serialized_name=".".join([*rooms, record.__name__]))
+
+
+class ByIdentity:
+    """A user's function as a static argument: the same object is compiled once, an equal one again.
+
+    Bound methods of one object are equal even after that object has changed. Functions may also be unhashable.
+    """
+
+    def __init__(self, function: Callable) -> None:
+        self.function = function
+
+    def __call__(self, *args, **kwargs):
+        return self.function(*args, **kwargs)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ByIdentity) and other.function is self.function
+
+    def __hash__(self) -> int:
+        return id(self.function)

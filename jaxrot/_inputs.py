@@ -1,7 +1,7 @@
 """The gate: every public function's arguments pass here, and fail here, while the program is traced."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import jax
@@ -175,6 +175,17 @@ def check_damping(damping: float) -> float:
     if not 0 <= number < math.inf:
         raise ValueError(f"damping must be finite and >= 0; got {number}")
     return number
+
+
+def check_function(function: Callable, name: str) -> Callable:
+    """Returns a user's function.
+
+    Raises:
+        TypeError: It is not callable.
+    """
+    if not callable(function):
+        raise TypeError(f"{name} must be a function; got {type(function).__name__}")
+    return function
 
 
 def check_flag(flag: bool, name: str) -> bool:

@@ -60,8 +60,9 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
     Derivative:
         Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
         equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
-        one of these is below about 64 eps tr S its part is damped to 0. For functions of the nearest rotation or of
-        the stretch use `nearest_rotation` and `polar_decomposition`, which have no difference in a denominator.
+        one of these is below about 64 eps tr S its part is damped to 0. So the derivative of a composition such as
+        U diag(φ(s)) Vᵀ or V diag(φ(s)) Vᵀ is wrong at equal and nearly equal singular values, although it exists: use
+        `isotropic_map`. For the rotation or the stretch alone use `nearest_rotation` or `polar_decomposition`.
 
     Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
     the eigenvectors of the stretch, by `_symmetric.eigen`.
@@ -94,7 +95,8 @@ def signed_singular_values(matrix: ArrayLike) -> jax.Array:
         Unique.
 
     Derivative:
-        ṡᵢ = uᵢᵀ Ȧ vᵢ, see `rotation_variant_svd`.
+        ṡᵢ = uᵢᵀ Ȧ vᵢ, see `rotation_variant_svd`. The gradient of a symmetric function of s is right. Its Hessian is
+        wrong at equal and nearly equal singular values, although it exists: use `isotropic_energy`.
 
     Source: as for `rotation_variant_svd`.
     """

@@ -4,6 +4,8 @@ import jax.numpy as jnp
 
 from jaxrot import (
     arap_hessian,
+    isotropic_energy,
+    isotropic_map,
     polar_decomposition,
     rotation_gap,
     rotation_jacobian,
@@ -20,6 +22,8 @@ PARTS = {
     "rotation_jacobian": rotation_jacobian,
     "twist_modes": lambda a: twist_modes(a).modes,
     "arap_hessian": arap_hessian,
+    "isotropic_energy": lambda a: isotropic_energy(a, lambda s: jnp.sum(jnp.tanh(s))),
+    "isotropic_map": lambda a: isotropic_map(a, jnp.tanh),
 }
 
 
@@ -35,7 +39,8 @@ def dense(matrix):
 
 def all_parts(matrix):
     """Every part of every matrix in one row, so that tests which only compile do it once."""
-    return jnp.concatenate([decomposition(matrix), dense(matrix)], axis=-1)
+    isotropic = _rows(isotropic_map(matrix, jnp.tanh), isotropic_energy(matrix, lambda s: jnp.sum(jnp.tanh(s))))
+    return jnp.concatenate([decomposition(matrix), dense(matrix), isotropic], axis=-1)
 
 
 def _rows(first, *others):

@@ -10,7 +10,6 @@ PACKAGE = pathlib.Path(__file__).parent.parent / "jaxrot"
 # Each room may import from the rows above its own, and from its own row.
 LAYERS = [
     {
-        "_blocks",
         "_choice",
         "_complex",
         "_frozen",
@@ -21,12 +20,13 @@ LAYERS = [
         "_startup",
         "families",
     },
-    {"_compiled", "_definite", "_jacobi", "_saturation", "_symmetric"},
+    {"_blocks", "_compiled", "_definite", "_jacobi", "_saturation", "_symmetric"},
     {"_derivative"},
     {"steps"},
     {"solvers"},
     {"_nearest", "_refine", "_svd"},
-    {"_conditioning", "_dense", "_polar"},
+    {"_conditioning", "_dense", "_divided_differences", "_polar"},
+    {"_isotropic"},
     {"measuring"},
     {"_sample"},
     {"_candidates"},
@@ -37,7 +37,7 @@ LAYERS = [
     {"recommending", "report", "simulate"},
     {"__main__"},
 ]
-CORE = {name for layer in LAYERS[:12] for name in layer}
+CORE = {name for layer in LAYERS[:13] for name in layer}
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
 FILES = sorted(PACKAGE.rglob("*.py"))
 

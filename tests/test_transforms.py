@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 from jax.sharding import AxisType, NamedSharding
 from jax.sharding import PartitionSpec as P
-from parts import all_parts, decomposition
+from parts import PARTS, all_parts, decomposition
 
-from jaxrot import DEFAULT_METHOD, METHODS, STEPS, nearest_quaternion_wxyz, nearest_rotation, refine_rotation
+from jaxrot import (
+    DEFAULT_METHOD,
+    METHODS,
+    STEPS,
+    in_blocks,
+    nearest_quaternion_wxyz,
+    nearest_rotation,
+    refine_quaternion_wxyz,
+    refine_rotation,
+)
 
 A = np.random.default_rng(0).standard_normal((64, 3, 3)).astype(np.float32)
 LAPACK = {"svd", "davenport"}
@@ -57,6 +66,93 @@ def test_a_sharded_batch_needs_no_collectives(function, axis_type):
         result = compiled(sharded)
     assert len(result.sharding.device_set) == 8
     np.testing.assert_allclose(np.asarray(result), np.asarray(function(A)), atol=1e-4)
+
+
+EYE = np.eye(3, dtype=np.float32)
+MAPPED = {
+    **PARTS,
+    "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
+    "refine_quaternion_wxyz": lambda a: refine_quaternion_wxyz(a, EYE[0][[0, 1, 2, 2]], escape=True),
+    **{f"nearest_rotation {method}": functools.partial(nearest_rotation, method=method) for method in METHODS},
+    **{
+        f"refine_rotation {step} {derivative}": functools.partial(
+            refine_rotation, rotation=EYE, step=step, derivative=derivative
+        )
+        for step in STEPS
+        for derivative in ("implicit", "unrolled")
+    },
+}
+IN_SHORT = {f"nearest_rotation {DEFAULT_METHOD}", "refine_rotation torque unrolled", "nearest_quaternion_wxyz"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in IN_SHORT else [pytest.mark.exhaustive]) for name in MAPPED]
+)
+def test_it_maps_over_a_sharded_batch(name):
+    """On a mesh with Explicit axes: jax 0.10 refuses a choice between two constants that vmap does not know."""
+    function = MAPPED[name]
+    mesh = jax.make_mesh((8,), ("batch",), axis_types=(AxisType.Explicit,))
+    transforms = [jax.vmap(function)]
+    # One method's derivative is that of all.
+    if "nearest_rotation" not in name or DEFAULT_METHOD in name:
+        transforms += [jax.vmap(gradient_of(function)), gradient_of(jax.vmap(function))]
+    with jax.set_mesh(mesh):
+        sharded = jax.device_put(A, NamedSharding(mesh, P("batch")))
+        for transform in transforms:
+            result = jax.jit(transform).trace(sharded).out_info
+            assert all(x.sharding.spec[0] == "batch" for x in jax.tree.leaves(result))
+
+
+@pytest.mark.parametrize("axis_type", [AxisType.Auto, AxisType.Explicit])
+def test_blocks_work_on_each_device(axis_type):
+    start = np.broadcast_to(np.eye(3, dtype=np.float32), A.shape)
+
+    def refined(matrix, rotation):
+        return refine_rotation(matrix, rotation, step="torque_exact_angle", iterations=2)
+
+    def slope(function):
+        return jax.grad(lambda matrix, rotation: jnp.sum(function(matrix, rotation) ** 3))
+
+    mesh = jax.make_mesh((8,), ("batch",), axis_types=(axis_type,))
+    for transform in (lambda f: f, slope):
+        expected = np.asarray(jax.jit(transform(refined))(A, start))
+        blocked = transform(in_blocks(refined, 4))
+        if axis_type == AxisType.Auto:
+            blocked = jax.shard_map(blocked, mesh=mesh, in_specs=P("batch"), out_specs=P("batch"))
+        with jax.set_mesh(mesh):
+            sharded = [jax.device_put(x, NamedSharding(mesh, P("batch"))) for x in (A, start)]
+            compiled = jax.jit(blocked).lower(*sharded).compile()
+            assert "while(" in compiled.as_text()
+            assert not COLLECTIVES.search(compiled.as_text())
+            result = compiled(*sharded)
+        assert len(result.sharding.device_set) == 8
+        np.testing.assert_allclose(np.asarray(result), expected, atol=1e-4)
+
+
+def test_blocks_take_a_start_that_is_not_sharded_and_values_from_outside():
+    mesh = jax.make_mesh((8,), ("batch",), axis_types=(AxisType.Explicit,))
+    start = np.broadcast_to(np.eye(3, dtype=np.float32), A.shape)
+    with jax.set_mesh(mesh):
+        sharded = jax.device_put(A, NamedSharding(mesh, P("batch")))
+        result = in_blocks(refine_rotation, 4)(sharded, start)
+        assert jax.typeof(result).sharding.spec[0] == "batch"
+        np.testing.assert_allclose(np.asarray(result), refine_rotation(A, start), atol=1e-6)
+
+    def scaled(matrix, factor):
+        return in_blocks(lambda a: nearest_rotation(a, method="gram_schmidt") * factor[0], 4)(matrix)
+
+    mesh = jax.make_mesh((8,), ("batch",), axis_types=(AxisType.Auto,))
+    mapped = jax.shard_map(scaled, mesh=mesh, in_specs=P("batch"), out_specs=P("batch"))
+    factors = np.arange(8, dtype=np.float32)
+    expected = np.asarray(nearest_rotation(A, method="gram_schmidt")) * factors.repeat(8)[:, None, None]
+    np.testing.assert_allclose(jax.jit(mapped)(A, factors), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("platform", ["gpu", "tpu"])
+def test_blocks_are_for_the_cpu_alone(platform, monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: platform)
+    blocked = in_blocks(functools.partial(nearest_rotation, method="gram_schmidt"), 4)
+    assert "while" not in jax.jit(blocked).lower(A).as_text()
 
 
 @all_functions
