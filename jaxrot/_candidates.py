@@ -87,9 +87,6 @@ def outside_domain(method: Method, sample: Sample) -> str | None:
     """Why a method is not for matrices like these, in words, or None; see `recommend` for the rule."""
     if not method.handles_inversion and sample.not_upright:
         return f"for det A > 0, and {sample.not_upright:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
-    size = sample.judged.size
-    if not method.scale_free and (size.max() > domain.UNIT_SCALE or size.min() < 1 / domain.UNIT_SCALE):
-        return f"for matrices of size 1, and sizes are from {number(size.min())} to {number(size.max())}"
     limit = method.condition_limit[sample.dtype]
     largest = sample.largest_condition
     # At a limit this high nothing is left out, matrices without a unique R* included.

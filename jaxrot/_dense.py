@@ -228,5 +228,5 @@ def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
 
 def _product(a: jax.Array, b: jax.Array) -> jax.Array:
     """The matrix product of (..., n, 3) and (..., 3, m), by elementwise products: an accelerator rounds `@` to TF32."""
-    x, y, z = (a[..., :, i, None] * b[..., i, None, :] for i in range(3))
+    x, y, z = (a[..., i][..., None] * b[..., i, :][..., None, :] for i in range(3))
     return x + y + z

@@ -160,7 +160,7 @@ def _energy_jvp(energy: _Function, order: int, primals, tangents):
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4))
 def _mapped(matrix: jax.Array, parameters: tuple, function: _Function, vectors: str, order: int) -> jax.Array:
     left, s, _, right = decomposed(matrix, order)
-    x, y, z = jnp.moveaxis(_batched(function, s, parameters), -1, 0)
+    x, y, z = _mat3.vector_components(_batched(function, s, parameters))
     outer, inner = _axes(left, right, vectors)
     scaled = [_mat3.multiply_entries(row, (x, y, z)) for row in outer]
     return _mat3.stack(_mat3.multiply((scaled[0], scaled[1], scaled[2]), _mat3.transpose(inner)))
@@ -182,7 +182,7 @@ def _mapped_jvp(function: _Function, vectors: str, order: int, primals, tangents
     at_parameters = lambda s: batched(s, *parameters)  # noqa: E731
     slopes = divided_differences(at_parameters, s, phi, is_even=vectors != "left_right")
     a, b = _mat3.multiply_entries(a, slopes.over_differences), _mat3.multiply_entries(b, slopes.over_sums)
-    x, y, z = jnp.moveaxis(phi_dot, -1, 0)
+    x, y, z = _mat3.vector_components(phi_dot)
     if vectors == "left_right":
         upper, lower = _mat3.add_vectors(a, b), _mat3.add_vectors(a, _mat3.scale_vector(b, -1.0))
     else:

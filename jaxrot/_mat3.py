@@ -24,6 +24,11 @@ def components(matrix: jax.Array) -> Mat3:
     return row[0], row[1], row[2]
 
 
+def vector_components(vector: jax.Array) -> Vec3:
+    """Splits (..., 3) into its three entries."""
+    return vector[..., 0], vector[..., 1], vector[..., 2]
+
+
 def stack(m: Mat3) -> jax.Array:
     """Joins nine entries into (..., 3, 3)."""
     return jnp.stack([jnp.stack(row, axis=-1) for row in m], axis=-2)

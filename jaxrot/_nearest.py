@@ -20,7 +20,8 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
-            default floating dtype.
+            default floating dtype, float64 in float32 unless JAX's 64-bit types are on. Entries below the smallest
+            normal number count as 0.
         method: A name in `METHODS`, whose record states the method's domain. The default keeps the accuracy below for
             every finite matrix.
         damping: Relative damping δ/tr(RᵀA) ≥ 0 of the derivative, for learning: it bounds the norm of the derivative
@@ -37,7 +38,8 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
 
     Uniqueness:
         R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|: rank 2 and inverted matrices are fine.
-        Elsewhere R is one of the rotations with the largest tr(RᵀA), always the same for the same matrix.
+        Elsewhere R is one of the rotations with the largest tr(RᵀA). The same compiled program returns the same one
+        wherever the matrix stands in the batch; another program (eager, another batch size) may return another.
 
     Derivative:
         Forward and reverse, to any order, by one rule for every method: the derivative of the nearest rotation at the

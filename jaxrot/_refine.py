@@ -25,8 +25,8 @@ def refine_rotation(
     matrix: ArrayLike,
     rotation: ArrayLike,
     *,
-    step: str = "torque",
-    iterations: int = 3,
+    step: str = "newton",
+    iterations: int = 2,
     escape: bool = False,
     derivative: str = "implicit",
 ) -> jax.Array:
@@ -38,8 +38,10 @@ def refine_rotation(
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
-        rotation: The start, shape (..., 3, 3); its batch axes broadcast against those of `matrix`.
-        step: A name in `STEPS`. Static.
+        rotation: The start, shape (..., 3, 3), times any factor but 0; its batch axes broadcast against those of
+            `matrix`.
+        step: A name in `STEPS`. The paper's `torque` is enough where the singular values are of one size and the
+            rotation changes little; a rod that turns by 5° a frame it follows 6 to 13° late, or not at all. Static.
         iterations: How many steps, ≥ 0. Static.
         escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
             about one step more, and nothing when it is off.
@@ -92,8 +94,8 @@ def refine_quaternion_wxyz(
     matrix: ArrayLike,
     quaternion_wxyz: ArrayLike,
     *,
-    step: str = "torque",
-    iterations: int = 3,
+    step: str = "newton",
+    iterations: int = 2,
     escape: bool = False,
     derivative: str = "implicit",
 ) -> jax.Array:

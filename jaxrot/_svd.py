@@ -55,7 +55,8 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
 
     Uniqueness:
         s is unique. U and V are unique up to the signs of two columns where the singular values differ; where two are
-        equal, or s2 = −s3, a plane of them may turn. They are always the same for the same matrix.
+        equal, or s2 = −s3, a plane of them may turn. They are the same for the same matrix in one compiled
+        program.
 
     Derivative:
         Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are

@@ -1,6 +1,7 @@
 """The specification as assertions: what a rotation must be to be the nearest one, measured in higher precision."""
 
 import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,12 @@ def family_batch(dtype: str, count: int = 24, seed: int = 0) -> Batch:
         np.asarray(reference.condition(matrices)),
         np.asarray(reference.reference_rotation(matrices)),
     )
+
+
+def in_families(batch: Batch, names: Sequence[str]) -> np.ndarray:
+    """Which matrices of the batch belong to these families; a name that is none fails."""
+    assert set(names) <= set(FAMILIES), f"no families: {set(names) - set(FAMILIES)}"
+    return np.isin(batch.families, names)
 
 
 def assert_within(measured: np.ndarray, bound: np.ndarray | float, families: np.ndarray, promise: str) -> None:

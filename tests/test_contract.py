@@ -7,7 +7,7 @@ import hypothesis.extra.numpy as arrays
 import jax
 import numpy as np
 import pytest
-from certificate import Batch, assert_contract, assert_forward_error, family_batch, resolved
+from certificate import Batch, assert_contract, assert_forward_error, family_batch, in_families, resolved
 from hypothesis import strategies
 
 from jaxrot import nearest_rotation
@@ -120,7 +120,7 @@ def test_every_stage_is_needed(guard):
         "renormalisation": ["rotation", "gaussian"],
     }[guard]
     rotation = np.asarray(jax.jit(functools.partial(half_turn.solve, without=(guard,)))(batch.matrices))
-    where = np.isin(batch.families, families)
+    where = in_families(batch, families)
     part = Batch(*(entry[where] for entry in batch))
     if guard == "renormalisation":
         assert reference.orthogonality_error(rotation).max() > 4 * np.finfo(np.float64).eps
@@ -128,3 +128,28 @@ def test_every_stage_is_needed(guard):
     else:
         with pytest.raises(AssertionError):
             assert_contract(rotation[where], part)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_where_a_matrix_stands_in_the_batch_changes_no_bit(dtype):
+    """In one compiled program; where R is not unique another program may return another."""
+    n = np.array([1, 2, 2]) / 3
+    special = [np.eye(3) - 2 * np.outer(n, n), -np.eye(3), np.diag([1, 0, 0]), np.diag([1.0, 0.5, -0.5])]
+    special += list(np.random.default_rng(5).standard_normal((4, 3, 3)))
+    batch = np.concatenate([np.roll(special, shift, axis=0) for shift in range(8)] * 20).astype(dtype)
+    rotation = np.asarray(nearest_rotation(batch)).reshape(-1, 8, 3, 3)
+    for row, shift in enumerate(list(range(8)) * 20):
+        np.testing.assert_array_equal(np.roll(rotation[row], -shift, axis=0), rotation[0])
+
+
+def test_entries_below_the_smallest_normal_number_count_as_zero():
+    matrix = np.float32([[1e-37, 0, 0], [0, 0, -1e-38], [0, 1e-38, 0]])
+    np.testing.assert_array_equal(nearest_rotation(matrix), np.eye(3))
+
+
+def test_without_64_bit_types_a_float64_array_is_computed_in_float32():
+    jax.config.update("jax_enable_x64", False)
+    try:
+        assert nearest_rotation(np.eye(3, dtype=np.float64)).dtype == np.float32
+    finally:
+        jax.config.update("jax_enable_x64", True)

@@ -6,6 +6,8 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from jaxrot import METHODS, STEPS
 from jaxrot.simulate.catalogue import SCENES
 
@@ -13,12 +15,11 @@ ROOT = pathlib.Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 
 
-def test_the_code_in_the_readme_does_what_it_says():
-    assert len(doctest.DocTestParser().get_examples(README)) >= 12
+@pytest.mark.parametrize(("page", "examples"), [("README.md", 12), ("jaxrot/RECIPES.md", 20)])
+def test_the_code_of_a_page_does_what_it_says(page, examples):
+    assert len(doctest.DocTestParser().get_examples((ROOT / page).read_text())) >= examples
     # In an interpreter of its own: as a newcomer pastes it, without this suite's settings.
-    run = subprocess.run(
-        [sys.executable, "-m", "doctest", "README.md"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    run = subprocess.run([sys.executable, "-m", "doctest", page], cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout
 
 

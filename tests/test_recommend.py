@@ -136,13 +136,6 @@ def test_the_declared_domain_decides_who_is_a_candidate(s, expected):
     assert admitted(stretched(s)) == expected
 
 
-def test_a_method_that_is_not_scale_free_is_for_unit_scale():
-    method = METHODS["squaring"]._replace(scale_free=False)
-    assert outside_domain(method, take_sample(noisy(5, 0.01), None, None)) is None
-    reason = outside_domain(method, take_sample(np.eye(3) * [[[1]], [[3]]], None, None))
-    assert reason == "for matrices of size 1, and sizes are from 1 to 3"
-
-
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
 def test_scale_changes_nothing(scale):
     matrices = noisy(50, 0.01)

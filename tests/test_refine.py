@@ -38,9 +38,53 @@ def test_the_torque_step_is_linear_at_the_predicted_rate(singular_values, rate):
     rotation = turned([1, 2, 3], 1e-3)
     errors = []
     for _ in range(12):
-        rotation = refine_rotation(matrix, rotation, iterations=1)
+        rotation = refine_rotation(matrix, rotation, step="torque", iterations=1)
         errors.append(np.linalg.norm(rotation - np.eye(3)))
     assert errors[-1] / errors[-2] == pytest.approx(rate, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "scales"), [("float32", (1e-30, 1e-25, 1e20, 1e38)), ("float64", (1e-300, 1e-160, 1e160, 1e300))]
+)
+def test_a_start_may_have_any_length(dtype, scales):
+    matrices, quaternions = RANDOM.standard_normal((5, 3, 3)).astype(dtype), RANDOM.standard_normal((5, 4))
+    quaternions = np.concatenate([quaternions[:4], [[0, 1, 0, 0]]]).astype(dtype)
+    start = np.asarray(refine_quaternion_wxyz(matrices, quaternions, iterations=0))
+    expected = np.asarray(refine_quaternion_wxyz(matrices, quaternions))
+    eps = np.finfo(dtype).eps
+    for scale in scales:
+        for sign in (1, -1):
+            scaled = quaternions * np.asarray(sign * scale, dtype)
+            np.testing.assert_allclose(
+                refine_quaternion_wxyz(matrices, scaled, iterations=0), sign * start, atol=4 * eps
+            )
+            np.testing.assert_allclose(refine_quaternion_wxyz(matrices, scaled), sign * expected, atol=1e3 * eps)
+    turns = rotations(5).astype(dtype)
+    rotation = np.asarray(refine_rotation(matrices, turns))
+    for scale in scales:
+        scaled = turns * np.asarray(scale, dtype)
+        np.testing.assert_allclose(refine_rotation(matrices, scaled, iterations=0), turns, atol=16 * eps)
+        np.testing.assert_allclose(refine_rotation(matrices, scaled), rotation, atol=1e3 * eps)
+
+
+def test_a_start_without_direction_is_the_identity():
+    np.testing.assert_array_equal(refine_rotation(np.eye(3), np.zeros((3, 3)), iterations=0), np.eye(3))
+    np.testing.assert_array_equal(refine_quaternion_wxyz(np.eye(3), np.zeros(4), iterations=0), [1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("singular_values", [(1, 0.05, 0.02), (1, 0.005, 0.002)])
+def test_the_default_follows_a_thin_rod_that_turns(singular_values):
+    """5° a frame. Three torque steps lag 6° behind the first one, and lose the second."""
+    lag = {}
+    for options in ({}, {"step": "torque", "iterations": 3}):
+        rotation, angles = np.eye(3), []
+        for frame in range(60):
+            turn = turned([1, 2, 3], np.radians(5 * frame))
+            rotation = np.asarray(refine_rotation(turn @ np.diag(singular_values), rotation, **options))
+            angles.append(np.degrees(np.linalg.norm(rotation - turn) / np.sqrt(2)))
+        lag[options.get("step", "default")] = np.mean(angles[20:])
+    assert lag["default"] < 0.01
+    assert lag["torque"] > 5
 
 
 def test_more_iterations_are_the_same_as_repeated_calls():

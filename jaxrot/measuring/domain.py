@@ -11,10 +11,6 @@ ORTHOGONALITY_BOUND = 10
 LOST_TRACE_BOUND = 16
 TORQUE_BOUND = 128
 
-# A method that is not scale-free was derived for matrices near rotations; beyond this factor from unit size it promises
-# nothing.
-UNIT_SCALE = 2.0
-
 
 def in_domain(method: Method, judged: Judged) -> np.ndarray:
     """Which matrices a method declares it keeps the contract on.
@@ -32,8 +28,6 @@ def in_domain(method: Method, judged: Judged) -> np.ndarray:
     inside = np.full(len(judged.matrices), limit >= largest_condition(dtype)) | (judged.condition <= limit)
     if not method.handles_inversion:
         inside = inside & (~judged.is_inverted)
-    if not method.scale_free:
-        inside = inside & (judged.size <= UNIT_SCALE) & (judged.size >= 1 / UNIT_SCALE)
     return inside
 
 
@@ -48,8 +42,6 @@ def describe_domain(method: Method, dtype: str) -> str:
     words = ["exact" if method.exact else "approximation"]
     if not method.handles_inversion:
         words.append("det ≥ 0")
-    if not method.scale_free:
-        words.append("unit scale")
     if method.exact and limit < largest_condition(dtype):
         words.append(f"κ ≤ {limit:.2g}".replace("e+0", "e").replace("e+", "e") if limit > 0 else "κ: none")
     return ", ".join(words)

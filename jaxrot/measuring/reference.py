@@ -118,24 +118,9 @@ def lost_trace(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference
 
 
 def torque(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference | None = None) -> Float64:
-    """‖RᵀA − AᵀR‖_F / s1, the asymmetry of the stretch: the first half of the certificate of optimality."""
+    """‖RᵀA − AᵀR‖_F / s1, the asymmetry of the stretch: 0 at every equilibrium of the torque, R* among these."""
     stretch = _relative_stretch(rotation, matrices, reference or solve(matrices))
     return _norm(stretch - np.swapaxes(stretch, -1, -2), axis=(-2, -1)).astype(np.float64)
-
-
-def certificate_gap(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference | None = None) -> Float64:
-    """The smallest eigenvalue of tr(S)·1 − S over s1, S the symmetric part of RᵀA: the second half of the certificate.
-
-    (s2 + s3) / s1 at R*; negative at an equilibrium of the torque that is not the nearest rotation.
-    """
-    stretch = _relative_stretch(rotation, matrices, reference or solve(matrices))
-    symmetric = (stretch + np.swapaxes(stretch, -1, -2)) / 2
-    # NumPy has no eigenvalues in long double. Shifted by its norm S is positive semidefinite, and the largest singular
-    # value of that is the largest eigenvalue.
-    shift = _norm(symmetric, axis=(-2, -1))
-    shifted = symmetric + shift[..., None, None] * IDENTITY
-    largest = signed_singular_values(shifted)[..., 0] - shift
-    return (_trace(symmetric) - largest).astype(np.float64)
 
 
 def _unit_scaled(matrices: ArrayLike) -> tuple[LongDouble, NDArray[np.int32]]:

@@ -36,7 +36,6 @@ class Method(NamedTuple):
         solve: From (..., 3, 3) float32 or float64 to rotations of the same shape; carries no derivative rule.
         exact: It computes the nearest rotation to rounding, not an approximation of it.
         handles_inversion: Right for det A < 0 too.
-        scale_free: Right at every scale, from the smallest normal numbers to the largest.
         condition_limit: By dtype, the largest κ = s1/(s2+s3), a power of two, up to which it keeps the numerical
             contract of the default method (forward error 8 eps (1+κ), orthogonality 10 eps, lost trace 16 eps s1,
             torque 128 eps s1), measured over all families that the flags admit; 0: not even near κ = 1/2, a
@@ -47,7 +46,6 @@ class Method(NamedTuple):
     solve: Callable[[jax.Array], jax.Array]
     exact: bool
     handles_inversion: bool
-    scale_free: bool
     condition_limit: Mapping[str, float]
     source: str
 
@@ -62,44 +60,139 @@ DEFAULT_METHOD = "half_turn"
 METHODS: Mapping[str, Method] = FrozenMapping(
     {
         "half_turn": Method(
-            half_turn.solve, True, True, True, _limit(2.0**20, 2.0**49), "Markley 1993; Higham and Noferini 2016"
+            half_turn.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2.0**20, 2.0**49),
+            source="Markley 1993; Higham and Noferini 2016",
         ),
-        "svd": Method(svd.solve, True, True, True, _limit(0, 0), "LAPACK; Kabsch 1976"),
-        "davenport": Method(davenport.solve, True, True, True, _limit(0, 0), "Davenport's q-method; Horn 1987"),
-        "smith_franca": Method(smith_franca.solve, True, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (16)"),
+        "svd": Method(
+            svd.solve, exact=True, handles_inversion=True, condition_limit=_limit(0, 0), source="LAPACK; Kabsch 1976"
+        ),
+        "davenport": Method(
+            davenport.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(0, 0),
+            source="Davenport's q-method; Horn 1987",
+        ),
+        "smith_franca": Method(
+            smith_franca.solve,
+            exact=True,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Sarabandi et al. 2020, eq. (16)",
+        ),
         "quaternion_average": Method(
-            quaternion_average.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (30)"
+            quaternion_average.solve,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Sarabandi et al. 2020, eq. (30)",
         ),
-        "cayley": Method(cayley.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (31)"),
-        "foam": Method(foam.solve, True, True, True, _limit(0.5, 0.5), "Markley 1993"),
-        "squaring": Method(squaring.solve, True, True, True, _limit(2.0**20, 2.0**49), "Wu et al. 2018 (FA3R)"),
+        "cayley": Method(
+            cayley.solve,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Sarabandi et al. 2020, eq. (31)",
+        ),
+        "foam": Method(
+            foam.solve, exact=True, handles_inversion=True, condition_limit=_limit(0.5, 0.5), source="Markley 1993"
+        ),
+        "squaring": Method(
+            squaring.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2.0**20, 2.0**49),
+            source="Wu et al. 2018 (FA3R)",
+        ),
         "irving": Method(
-            irving.solve, True, True, True, _limit(0, 0), "Irving et al. 2004; Müller et al. 2016, appendix C"
+            irving.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(0, 0),
+            source="Irving et al. 2004; Müller et al. 2016, appendix C",
         ),
-        "gram_schmidt": Method(gram_schmidt.solve, False, False, True, _limit(0, 0), "Müller et al. 2016, section 2"),
+        "gram_schmidt": Method(
+            gram_schmidt.solve,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Müller et al. 2016, section 2",
+        ),
         "inverse_square_root": Method(
             inverse_square_root.solve,
-            True,
-            False,
-            True,
-            _limit(0, 0),
-            "Wessner 1966; Sarabandi et al. 2020, eq. (2)",
+            exact=True,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Wessner 1966; Sarabandi et al. 2020, eq. (2)",
         ),
-        "higham_newton": Method(higham_newton.solve, True, False, True, _limit(0.5, 0.5), "Higham 1986"),
-        "taylor": Method(taylor.solve, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (20)"),
-        "taylor_iterated": Method(taylor.solve_iterated, True, False, True, _limit(0.5, 0.5), "Hasan 2009"),
+        "higham_newton": Method(
+            higham_newton.solve,
+            exact=True,
+            handles_inversion=False,
+            condition_limit=_limit(0.5, 0.5),
+            source="Higham 1986",
+        ),
+        "taylor": Method(
+            taylor.solve,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Sarabandi et al. 2020, eq. (20)",
+        ),
+        "taylor_iterated": Method(
+            taylor.solve_iterated,
+            exact=True,
+            handles_inversion=False,
+            condition_limit=_limit(0.5, 0.5),
+            source="Hasan 2009",
+        ),
         "shepperd_markley": Method(
-            shepperd_markley.solve, False, False, True, _limit(0, 0), "Shepperd 1978; Markley 2008"
+            shepperd_markley.solve,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Shepperd 1978; Markley 2008",
         ),
         "simple_average": Method(
-            quaternion_average.solve_simply, False, False, True, _limit(0, 0), "Sarabandi et al. 2020, eq. (29)"
+            quaternion_average.solve_simply,
+            exact=False,
+            handles_inversion=False,
+            condition_limit=_limit(0, 0),
+            source="Sarabandi et al. 2020, eq. (29)",
         ),
-        "horn_quartic": Method(horn_quartic.solve, True, True, True, _limit(2, 2), "Horn 1987"),
-        "higham_noferini": Method(higham_noferini.solve, True, True, True, _limit(2, 2), "Higham and Noferini 2016"),
-        "jacobi_svd": Method(jacobi_svd.solve, True, True, True, _limit(2.0**20, 2.0**49), "Kogbetliantz 1955"),
+        "horn_quartic": Method(
+            horn_quartic.solve, exact=True, handles_inversion=True, condition_limit=_limit(2, 2), source="Horn 1987"
+        ),
+        "higham_noferini": Method(
+            higham_noferini.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2, 2),
+            source="Higham and Noferini 2016",
+        ),
+        "jacobi_svd": Method(
+            jacobi_svd.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2.0**20, 2.0**49),
+            source="Kogbetliantz 1955",
+        ),
         "implicit_qr_svd": Method(
-            implicit_qr_svd.solve, True, True, True, _limit(2.0**20, 2.0**49), "Gast et al. 2016"
+            implicit_qr_svd.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2.0**20, 2.0**49),
+            source="Gast et al. 2016",
         ),
-        "torque": Method(torque.solve, False, True, True, _limit(0, 0), "Müller et al. 2016, section 3"),
+        "torque": Method(
+            torque.solve,
+            exact=False,
+            handles_inversion=True,
+            condition_limit=_limit(0, 0),
+            source="Müller et al. 2016, section 3",
+        ),
     }
 )

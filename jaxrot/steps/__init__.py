@@ -14,23 +14,19 @@ class Step(NamedTuple):
 
     Attributes:
         correction: From B = QᵀA, on components and scale removed, to the quaternion of the rotation to append to Q.
-        convergence: Its order near the solution.
         source: Where it is from.
     """
 
     correction: Callable[[Mat3], Quaternion]
-    convergence: str
     source: str
 
 
 STEPS: Mapping[str, Step] = FrozenMapping(
     {
-        "torque": Step(torque.correction, "linear, max|sᵢ| / |Σsᵢ|", "Müller et al. 2016, eq. (7)"),
-        "torque_exact_angle": Step(
-            torque_exact_angle.correction, "linear, one step at cR", "Müller et al. 2016, eq. (4)"
-        ),
-        "newton": Step(newton.correction, "cubic, from any start", "Kugelstadt et al. 2018; Zhang 2021"),
-        "cayley": Step(cayley.correction, "cubic, from within 90°", "Zhang 2021"),
-        "quest": Step(quest.correction, "exact in one step, but at 180°", "Shuster and Oh 1981 (QUEST)"),
+        "torque": Step(torque.correction, source="Müller et al. 2016, eq. (7)"),
+        "torque_exact_angle": Step(torque_exact_angle.correction, source="Müller et al. 2016, eq. (4)"),
+        "newton": Step(newton.correction, source="Kugelstadt et al. 2018; Zhang 2021"),
+        "cayley": Step(cayley.correction, source="Zhang 2021"),
+        "quest": Step(quest.correction, source="Shuster and Oh 1981 (QUEST)"),
     }
 )

@@ -8,7 +8,7 @@ from jaxrot.families import FAMILIES, poison
 from jaxrot.measuring import reference
 from jaxrot.measuring.reference import EPS
 
-MEASURES = (reference.forward_error, reference.lost_trace, reference.torque, reference.certificate_gap)
+MEASURES = (reference.forward_error, reference.lost_trace, reference.torque)
 
 
 def rotation_about_z(angle):
@@ -63,7 +63,6 @@ def test_reference_passes_its_own_certificate_on_every_family(dtype):
     assert reference.orthogonality_error(r).max() <= 32 * EPS
     assert np.abs(reference.lost_trace(r, matrices, reference=solved)).max() <= 16 * EPS
     assert reference.torque(r, matrices, reference=solved).max() <= 16 * EPS
-    assert reference.certificate_gap(r, matrices, reference=solved).min() >= -16 * EPS
     for factor in (solved.left, solved.right):
         assert reference.orthogonality_error(factor).max() <= 32 * EPS
 
@@ -100,8 +99,8 @@ def test_reference_takes_any_batch():
     np.testing.assert_array_equal(reference.reference_rotation(matrices.reshape(2, 3, 3, 3)).reshape(6, 3, 3), whole)
     np.testing.assert_array_equal(reference.reference_rotation(matrices[4]), whole[4])
     assert reference.reference_rotation(matrices[:0]).shape == (0, 3, 3)
-    assert [measure(whole[:0], matrices[:0]).shape for measure in MEASURES] == [(0,)] * 4
-    assert [measure(whole[4], matrices[4]).shape for measure in MEASURES] == [()] * 4
+    assert [measure(whole[:0], matrices[:0]).shape for measure in MEASURES] == [(0,)] * len(MEASURES)
+    assert [measure(whole[4], matrices[4]).shape for measure in MEASURES] == [()] * len(MEASURES)
 
 
 def test_zero_has_no_error_but_not_a_number_stays_one():
@@ -133,17 +132,11 @@ def test_a_turned_rotation_is_reported(angle, scale):
         10 / 3 * np.sin(angle / 2) ** 2, rel=1e-5
     )  # loses what cos does
     assert reference.torque(turn, matrix) == pytest.approx(np.sqrt(2) * 5 / 3 * abs(np.sin(angle)), rel=1e-12)
-    symmetric = np.diag((3, 2, 0)) * np.cos(angle) + np.diag((0, 0, 1.0))
-    symmetric[0, 1] = symmetric[1, 0] = (2 - 3) * np.sin(angle) / 2
-    gap = np.trace(symmetric) - np.linalg.eigvalsh(symmetric)[-1]
-    assert reference.certificate_gap(turn, matrix) == pytest.approx(gap / 3, rel=1e-12)
 
 
 def test_an_equilibrium_that_is_not_the_nearest_rotation_is_reported():
     matrix, half_turn = np.diag((3.0, 2.0, 1.0)), np.diag((1.0, -1.0, -1.0))
     assert reference.torque(half_turn, matrix) == 0
-    assert reference.certificate_gap(half_turn, matrix) == -1
-    assert reference.certificate_gap(np.eye(3), matrix) == 1
     assert reference.lost_trace(half_turn, matrix) == 2
 
 
