@@ -174,11 +174,12 @@ def _clamped_jvp(primals, tangents):
 
 
 def _gaps(singular_values: jax.Array) -> Vec3:
-    # Singular values may be infinite where the matrix is not, and their differences must not be NaN.
-    bound = jnp.finfo(singular_values.dtype).max / 4
-    singular_values = lax.clamp(-bound, singular_values, bound)
-    s1, s2, s3 = singular_values[..., 0], singular_values[..., 1], singular_values[..., 2]
-    return s2 + s3, s3 + s1, s1 + s2
+    largest = jnp.finfo(singular_values.dtype).max
+    # Singular values and their sums may be infinite where the matrix is not, and differences must not be NaN.
+    halves = lax.clamp(-largest, singular_values, largest) * 0.5
+    s1, s2, s3 = halves[..., 0], halves[..., 1], halves[..., 2]
+    x, y, z = (2 * lax.clamp(-largest / 4, gap, largest / 4) for gap in (s2 + s3, s3 + s1, s1 + s2))
+    return x, y, z
 
 
 def _clamped_inverses(gaps: Vec3) -> Vec3:

@@ -1,6 +1,7 @@
 """The gate: every public function's arguments pass here, and fail here, while the program is traced."""
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -25,6 +26,10 @@ class Computing(NamedTuple):
 
     value: jax.Array
     dtype: np.dtype
+
+
+# Methods that another one has taken the place of.
+_REPLACED = {"half_turn": "singular_pair"}
 
 
 def check_array(argument: ArrayLike, name: str, trailing_shape: tuple[int, ...]) -> Array:
@@ -121,7 +126,7 @@ def check_start(start: ArrayLike, name: str, trailing_shape: tuple[int, ...], ma
 
 
 def check_choice(choice: str, name: str, registry: Mapping[str, object]) -> str:
-    """Admits a name in a registry.
+    """Returns a name in a registry; for one that was replaced that of its successor, with a warning.
 
     Raises:
         TypeError: `choice` is not a string.
@@ -129,6 +134,9 @@ def check_choice(choice: str, name: str, registry: Mapping[str, object]) -> str:
     """
     if not isinstance(choice, str):
         raise TypeError(f"{name} must be a string; got {type(choice).__name__}")
+    if _REPLACED.get(choice) in registry:
+        warnings.warn(f"{name} {choice!r} was replaced by {_REPLACED[choice]!r}", DeprecationWarning, stacklevel=3)
+        return _REPLACED[choice]
     if choice not in registry:
         raise ValueError(f"{name} must be one of {', '.join(sorted(registry))}; got {choice!r}")
     return choice

@@ -102,6 +102,12 @@ def transpose_multiply(a: Mat3, b: Mat3) -> Mat3:
     return multiply(transpose(a), b)
 
 
+def gram(m: Mat3) -> tuple[Vec3, Vec3]:
+    """The entries xx, yy, zz and yz, xz, xy of mᵀm."""
+    x, y, z = transpose(m)
+    return (dot(x, x), dot(y, y), dot(z, z)), (dot(y, z), dot(x, z), dot(x, y))
+
+
 def trace(m: Mat3) -> jax.Array:
     """The trace."""
     return m[0][0] + m[1][1] + m[2][2]
@@ -163,10 +169,10 @@ def newton_schulz(r: Mat3) -> Mat3:
 
     A quaternion turned into a matrix is off by up to 12 eps in 1e6 tries; the contract allows 10.
     """
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = transpose_multiply(r, r)
+    (xx, yy, zz), (yz, xz, xy) = gram(r)
     # The defect is formed before it is halved and multiplied: 3 − rᵀr would round it away.
-    defect = ((xx - 1, xy, xz), (xy, yy - 1, yz), (xz, yz, zz - 1))
-    return add(r, scale(multiply(r, defect), -0.5))
+    xx, yy, zz, yz, xz, xy = (xx - 1) * 0.5, (yy - 1) * 0.5, (zz - 1) * 0.5, yz * 0.5, xz * 0.5, xy * 0.5
+    return subtract(r, multiply(r, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))
 
 
 def where(condition: jax.Array, a: _Tree, b: _Tree) -> _Tree:

@@ -23,15 +23,14 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
         magnitude: Non-negative float32 or float64, any shape.
 
     Returns:
-        The factor, a normal number, same shape. For 0 and subnormal numbers it is the largest power of two there is;
-        for inf and NaN the smallest normal one. It is a constant to differentiation.
+        The factor, same shape. For 0 and subnormal numbers it is the largest power of two there is; for inf and NaN it
+        is 0, and inf·0 is NaN. It is a constant to differentiation.
     """
-    magnitude = lax.stop_gradient(magnitude)
     info = jnp.finfo(magnitude.dtype)
-    mantissa_bits, mask = int(info.nmant), (1 << int(info.nexp)) - 1
-    exponent = (lax.bitcast_convert_type(magnitude, jnp.dtype(f"int{info.bits}")) >> mantissa_bits) & mask
-    inverse = jnp.clip(mask - exponent, 1, mask - 1)
-    return lax.bitcast_convert_type(inverse << mantissa_bits, magnitude.dtype)
+    mask = ((1 << int(info.nexp)) - 1) << int(info.nmant)
+    normal = jnp.maximum(lax.stop_gradient(magnitude), float(info.tiny))
+    exponent = lax.bitcast_convert_type(normal, jnp.dtype(f"int{info.bits}")) & mask
+    return lax.bitcast_convert_type(mask - exponent, magnitude.dtype)
 
 
 def power_of_two(m: object) -> jax.Array:

@@ -60,7 +60,7 @@ def test_a_second_eager_call_compiles_nothing(name):
     assert compiled_programs(lambda: function(np.eye(3, dtype=np.float32))) == 0
 
 
-@pytest.mark.parametrize("name", ["nearest_rotation half_turn", "refine_rotation newton", "rotation_gap"])
+@pytest.mark.parametrize("name", ["nearest_rotation singular_pair", "refine_rotation newton", "rotation_gap"])
 def test_a_first_eager_call_is_one_program(name):
     # A shape that no other test has.
     assert compiled_programs(lambda: FUNCTIONS[name](np.ones((17, 3, 3), np.float32))) <= 1

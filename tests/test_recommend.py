@@ -16,7 +16,7 @@ from jaxrot.measuring.timing import Timing
 # What the report measured; a step is as fast as so many ns for each of its iterations.
 NS = {"taylor": 15, "quaternion_average": 15, "higham_noferini": 36, DEFAULT_METHOD: 52, "squaring": 132}
 NS_A_STEP = {"newton": 25, "cayley": 24, "quest": 27, "torque": 10, "torque_exact_angle": 20}
-ALWAYS = {"half_turn", "squaring", "jacobi_svd", "implicit_qr_svd"}
+ALWAYS = {"singular_pair", "squaring", "jacobi_svd", "implicit_qr_svd"}
 SLOW_TO_COMPILE = {"squaring", "jacobi_svd", "implicit_qr_svd", "horn_quartic"}
 APPROXIMATIONS = {name for name, method in METHODS.items() if not method.exact}
 LIMITED_TO_ROTATIONS = {"foam", "higham_newton", "taylor_iterated"}

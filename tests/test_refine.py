@@ -139,7 +139,7 @@ def test_the_torque_iteration_turns_the_right_way_beyond_a_right_angle():
     """The absolute value of the denominator: without it 7 % of random starts are not there after 50 iterations."""
     starts = rotations(300)
     assert (np.trace(starts, axis1=1, axis2=2) < 0).any()
-    refined = refine_rotation(np.eye(3), starts, iterations=50)
+    refined = refine_rotation(np.eye(3), starts, step="torque", iterations=50)
     np.testing.assert_allclose(refined, np.broadcast_to(np.eye(3), refined.shape), atol=1e-14)
 
 

@@ -138,7 +138,7 @@ def speed_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
         bound = f"{'≥' if goal['at_least'] else '≤'} {number(goal['bound'])}"
         rows.append(
             [
-                re.sub(r"\b(svd|half_turn|newton|quaternion_average)\b", r"`\1`", goal["what"]),
+                re.sub(r"\b(svd|singular_pair|newton|quaternion_average)\b", r"`\1`", goal["what"]),
                 f"{goal['batch']:,}",
                 number(goal["median"]) if is_single else spread,
                 bound if goal["is_met"] else f"{bound}, missed",

@@ -11,7 +11,6 @@ from jaxrot.solvers import (
     davenport,
     foam,
     gram_schmidt,
-    half_turn,
     higham_newton,
     higham_noferini,
     horn_quartic,
@@ -21,6 +20,7 @@ from jaxrot.solvers import (
     jacobi_svd,
     quaternion_average,
     shepperd_markley,
+    singular_pair,
     smith_franca,
     squaring,
     svd,
@@ -55,16 +55,16 @@ def _limit(float32: float, float64: float) -> Mapping[str, float]:
 
 
 # The fastest of the methods that keep the whole contract, singular, inverted and extreme matrices included.
-DEFAULT_METHOD = "half_turn"
+DEFAULT_METHOD = "singular_pair"
 
 METHODS: Mapping[str, Method] = FrozenMapping(
     {
-        "half_turn": Method(
-            half_turn.solve,
+        "singular_pair": Method(
+            singular_pair.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2.0**20, 2.0**49),
-            source="Markley 1993; Higham and Noferini 2016",
+            source="Wahba's problem on a circle; Smith 1961",
         ),
         "svd": Method(
             svd.solve, exact=True, handles_inversion=True, condition_limit=_limit(0, 0), source="LAPACK; Kabsch 1976"

@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3, _quaternion
+from jaxrot import _definite, _mat3, _quaternion
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
+from jaxrot._quaternion import Quaternion
 from jaxrot._scaling import safe_divide, safe_sqrt, scaled
-from jaxrot.solvers.half_turn import polish
 
 # The gap between the two largest eigenvalues of Davenport's matrix doubles with every squaring. Below these counts the
 # worst matrices, −R plus noise, are wrong: with 20 in float32 by 1.3 times the bound, with 40 in float64 by 612 times.
@@ -41,6 +42,17 @@ def solve(matrix: jax.Array) -> jax.Array:
     for _ in range(_POLISHING_STEPS):
         q = polish(a, q)
     return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
+
+
+def polish(a: Mat3, q: Quaternion) -> Quaternion:
+    """One Newton step; an axis whose gap is below 8 eps f moves by no more than it is determined."""
+    b = _mat3.transpose_multiply(_quaternion.to_scaled_rotation(q), a)
+    # With H formed again in every quotient the torque of matrices near −R was up to 13 times its bound in float64.
+    h, torque = computed_once((_mat3.gap_matrix(b), _mat3.axial(b)))
+    info = jnp.finfo(q[0].dtype)
+    trace = jnp.abs(h[0][0] + h[1][1] + h[2][2]) * 0.5
+    x, y, z = _definite.solve(_mat3.add_to_diagonal(h, 8 * float(info.eps) * trace + float(info.tiny) ** 0.5), torque)
+    return _quaternion.product(q, (jnp.ones_like(x), 0.5 * x, 0.5 * y, 0.5 * z))
 
 
 def square(h: Mat3) -> Mat3:

@@ -57,8 +57,8 @@ def measured():
             "families": judge({"easy": MATRICES[:4]}, "float32"),
         }
         steps = []
-        result = measure_beside(["half_turn"], judged, batch=16, budget_s=0.0, advance=steps.append)
-        assert len(steps) == number_of_steps(["half_turn"])
+        result = measure_beside(["singular_pair"], judged, batch=16, budget_s=0.0, advance=steps.append)
+        assert len(steps) == number_of_steps(["singular_pair"])
     return result
 
 
@@ -68,14 +68,14 @@ def of(measured, name) -> Contender:
 
 
 def test_jaxrot_and_its_peers_are_judged_alike(measured):
-    for name, digits in (("right", 1e-7), ("half_turn", 1e-6), ("half_turn in float64", 1e-7)):
+    for name, digits in (("right", 1e-7), ("singular_pair", 1e-6), ("singular_pair in float64", 1e-7)):
         contender = of(measured, name)
         assert 0 < contender.error.largest < 3 * digits
         assert 0 < contender.gradient_error.percentile_99 < 300 * digits
         assert contender.outside == contender.no_result == contender.gradient_no_number == 0
         assert contender.gradient_time.median > 0
         assert 0 < contender.time.quartile_1 <= contender.time.median <= contender.time.quartile_3
-    assert of(measured, "half_turn").is_own
+    assert of(measured, "singular_pair").is_own
     assert not of(measured, "right").is_own
     assert (of(measured, "right").threads, of(measured, "right").computes_in) == (3, "float64")
 
@@ -106,8 +106,8 @@ def test_the_skipped_are_named_with_the_reason(measured):
 
 def test_the_tables_name_everybody(measured):
     table = contenders_table(measured.contenders, "float32")
-    assert {row[0] for row in table.rows} == {"half_turn", "half_turn in float64", "right", "refuses", "NaN"}
-    assert [row[0].startswith("half_turn") for row in table.rows] == [True, True, False, False, False]
+    assert {row[0] for row in table.rows} == {"singular_pair", "singular_pair in float64", "right", "refuses", "NaN"}
+    assert [row[0].startswith("singular_pair") for row in table.rows] == [True, True, False, False, False]
     assert all(len(row) == len(table.header) for row in table.rows)
     assert len(sources_table(measured.contenders).rows) == 5
 

@@ -40,7 +40,7 @@ def verdicts(changes):
 
 
 FOUR = [("foam", 100), ("svd", 1000), ("taylor", 50), ("cayley", 60)]
-REST = [(method, 100) for method in ("squaring", "irving", "torque", "davenport", "half_turn", "horn_quartic")]
+REST = [(method, 100) for method in ("squaring", "irving", "torque", "davenport", "singular_pair", "horn_quartic")]
 RIGHT = [(method, 1e-7) for method, _ in FOUR]
 
 

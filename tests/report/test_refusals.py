@@ -87,7 +87,7 @@ def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--methods", "svd,svdd"], "unknown 'svdd'; expected some of half_turn,"),
+        (["--methods", "svd,svdd"], "unknown 'svdd'; expected some of singular_pair,"),
         (["--methods", ""], "unknown ''"),
         (["--dtype", "float16"], "expected one of float32, float64, both"),
         (["--batch", "10,x"], "expected whole numbers from 1"),

@@ -16,7 +16,7 @@ from jaxrot.report.stability.survivors import CASES, Grade, draw_survival, grade
 NAMES = list(jaxrot.METHODS)
 
 
-def accuracy(method="half_turn", family="zero", *, outside=0, orthogonality=1.0, lost_trace=1.0, dtype="float32"):
+def accuracy(method="singular_pair", family="zero", *, outside=0, orthogonality=1.0, lost_trace=1.0, dtype="float32"):
     """An entry; orthogonality and lost trace in units of eps."""
     errors = [1e-7] * 5
     return Accuracy._make(

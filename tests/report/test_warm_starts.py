@@ -37,7 +37,7 @@ def test_starts_are_the_angle_off(judged):
 def test_errors_are_those_of_the_iterations(judged, measured):
     assert measured[COLD_START, 0].error.largest < 1e-13
     assert measured["newton", 4].error.largest < 1e-12
-    refined = jaxrot.refine_rotation(judged.matrices, warm_starts._turned(judged), iterations=3)
+    refined = jaxrot.refine_rotation(judged.matrices, warm_starts._turned(judged), step="torque", iterations=3)
     error = reference.forward_error(np.asarray(refined), judged.matrices)
     assert measured["torque", 3].error.largest == pytest.approx(error.max())
     assert all(0 < entry.time.quartile_1 <= entry.time.median for entry in measured.values())

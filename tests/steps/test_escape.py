@@ -32,7 +32,7 @@ def test_every_half_turn_start_and_its_neighbours_are_left_for_the_nearest_rotat
     def distance(rotation):
         return np.linalg.norm(np.asarray(rotation - np.asarray(solved.rotation), float), axis=(-2, -1))
 
-    stays = distance(np.asarray(refine_rotation(matrices, starts, iterations=5)))
+    stays = distance(np.asarray(refine_rotation(matrices, starts, step="torque", iterations=5)))
     assert (stays[:3] > 1).mean() > 0.9
     reached = np.asarray(escaped(matrices, starts))
     assert distance(reached)[:, unique].max() < 0.3
@@ -42,7 +42,7 @@ def test_every_half_turn_start_and_its_neighbours_are_left_for_the_nearest_rotat
 
 def test_the_equilibrium_of_equation_8_is_left_and_plain_torque_stays():
     swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    np.testing.assert_allclose(refine_rotation(np.eye(3), swap, iterations=50), swap, atol=1e-15)
+    np.testing.assert_allclose(refine_rotation(np.eye(3), swap, step="torque", iterations=50), swap, atol=1e-15)
     np.testing.assert_allclose(refine_rotation(np.eye(3), swap, iterations=0, escape=True), np.eye(3), atol=1e-15)
 
 

@@ -95,7 +95,8 @@ def _cayley(b: Mat3, without: tuple[str, ...]) -> Quaternion:
 def _quest(b: Mat3, without: tuple[str, ...]) -> Quaternion:
     b = computed_once(b)
     shift = sum_of_singular_values(b) - _mat3.trace(b)
-    return _cayley_map(b, shift if "root above trace" in without else jnp.maximum(shift, 0), without)
+    above = shift if "root above trace" in without else jnp.where(shift < 0, jnp.zeros_like(shift), shift)
+    return _cayley_map(b, above, without)
 
 
 def _turn_about(h: Mat3, torque: Vec3, axis: Vec3, without: tuple[str, ...]) -> Quaternion:

@@ -1,0 +1,249 @@
+"""The default method: one well-separated pair of singular vectors, and the best angle in the plane across it."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxrot import _mat3
+from jaxrot._choice import computed_once, constant_like, sign_of
+from jaxrot._mat3 import Mat3, Vec3
+from jaxrot._quaternion import Quaternion
+from jaxrot._scaling import power_of_two_factor
+
+# The stages that keep a promise each and that `solve` can leave out, to see what they cost.
+GUARDS = ("scale", "largest column", "nearer reflection", "rotations as they are", "renormalisation")
+
+# cos(⅓ arccos r) on [0, 1] to 4e-5 and 2e-9, by Chebyshev interpolation. A Newton step follows.
+_COSINE = {
+    "float32": (0.8660663295, 0.1653303502, -0.04069119742, 0.009319683897),
+    "float64": (0.8660254056, 0.1666663711, -0.04810444145, 0.02460429679, -0.01510727516, 0.009383330571,
+                -0.004929691173, 0.001764856874, -0.0003028542016),
+}  # fmt: skip
+
+
+def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
+    """The nearest rotation, to rounding, without a branch, an iteration or a decomposition.
+
+    R maps each right singular vector to its left one. One pair is enough: only the angle about it is then missing.
+
+    1. n, the singular vector whose eigenvalue of AᵀA is separated: the largest or the smallest, whichever is further
+       from the middle one. It is a column of an adjugate. *largest column*: the one that cannot vanish.
+    2. u = R n: A n where n belongs to the largest singular value, else cof(A) n. The sign of det A takes no part.
+    3. Two reflections, of n and of u onto the third axis. *nearer reflection*: that of u to its own side.
+    4. The angle about n that makes tr(RᵀA) largest, and R's quaternion from the two reflections and the angle.
+    5. *rotations as they are*: where A is a rotation to √eps times a power of two, A itself goes on, so that repeated
+       repairs do not drift.
+    6. *renormalisation*: one Newton–Schulz step.
+
+    Rounding of AᵀA, eps s1², tilts v1 towards vⱼ by eps s1²/(s1² − sⱼ²), and R by that times (s1 − sⱼ)/s1, which is
+    eps s1/(s1 + sⱼ) ≤ eps κ. The same holds for v3 where it is the separated one, with a factor of √2.
+
+    Args:
+        matrix: (..., 3, 3), float32 or float64, any scale.
+        without: Names in `GUARDS` of stages to leave out, static; what remains has a smaller domain.
+
+    Returns:
+        (..., 3, 3) rotations that keep every line of the contract; NaN where the matrix is not finite.
+
+    Cost: about 450 flops, 28 divisions and 4 square roots included.
+    Source: Wahba's problem on the circle of rotations that map n to u; Smith 1961 for the eigenvalue.
+    """
+    a = _mat3.components(matrix)
+    if "scale" not in without:
+        a = _mat3.scale(a, power_of_two_factor(computed_once(_mat3.largest_entry(a))))
+    gram = deviator(a)
+    outer = outer_eigenvalue(gram)
+    x, y = eigenvector(gram, outer, is_chosen="largest column" not in without)
+    images = reflected(a, x, y)
+    axis = image_of_axis(images, outer < 0, is_nearer="nearer reflection" not in without)
+    cosine, sine, trace = half_angle(images, axis)
+    r = rotation(a, quaternion((x, y), axis, cosine, sine), gram, trace, is_kept="rotations as they are" not in without)
+    if "renormalisation" not in without:
+        r = _mat3.newton_schulz(r)
+    return _mat3.stack(r)
+
+
+class Deviator(NamedTuple):
+    """AᵀA − mean·1, without trace.
+
+    Attributes:
+        diagonal: xx, yy, zz.
+        off_diagonal: yz, xz, xy.
+        p: The square root of half the variance of the eigenvalues, a sixth of the squared norm.
+        xx: The first entry of AᵀA.
+    """
+
+    diagonal: Vec3
+    off_diagonal: Vec3
+    p: jax.Array
+    xx: jax.Array
+
+
+def deviator(a: Mat3) -> Deviator:
+    """AᵀA without its mean."""
+    (xx, yy, zz), off_diagonal = _mat3.gram(a)
+    mean = (xx + yy + zz) * (1 / 3)
+    diagonal = xx - mean, yy - mean, zz - mean
+    square = 0.5 * _mat3.dot(diagonal, diagonal) + _mat3.dot(off_diagonal, off_diagonal)
+    return Deviator(diagonal, off_diagonal, jnp.sqrt(square * (1 / 3)), xx)
+
+
+def outer_eigenvalue(gram: Deviator) -> jax.Array:
+    """The largest or the smallest eigenvalue of the deviator, whichever is further from the middle one.
+
+    They are 2p cos(⅓ arccos r + 120° k) with p² = `variance` and r = det/2p³. The separated one has the sign of r, and
+    its cosine is the root t ≥ √¾ of 4t³ − 3t = |r|, which is simple.
+    """
+    (xx, yy, zz), (yz, xz, xy), p, _ = gram
+    square = p * p
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    r = determinant / (2 * square * p + float(jnp.finfo(p.dtype).tiny))
+    size = jnp.abs(r)
+    *lower, t = _COSINE[r.dtype.name]
+    for coefficient in reversed(lower):
+        t = t * size + coefficient
+    p, square = p + p, 4 * (t * t)
+    return jnp.where(r < 0, -p, p) * ((square + square) * t + size) / (3 * square - 3)
+
+
+def eigenvector(gram: Deviator, eigenvalue: jax.Array, *, is_chosen: bool = True) -> tuple[jax.Array, jax.Array]:
+    """The x and y with n + e₃‖n‖ and (x, y, 1) parallel, n the eigenvector of a separated eigenvalue; e₃ is that of 0.
+
+    n is a column of the adjugate of what is singular, the one with the largest entry on the diagonal: nothing cancels,
+    and n is nowhere near −e₃.
+
+    Args:
+        gram: The deviator.
+        eigenvalue: One whose distance from the other two is of their size.
+        is_chosen: Whether the column is chosen; without that it is the third one, which may be 0.
+    """
+    (xx, yy, zz), (yz, xz, xy), *_ = gram
+    xx, yy, zz = xx - eigenvalue, yy - eigenvalue, zz - eigenvalue
+    third = (xy * yz - yy * xz, xy * xz - xx * yz, xx * yy - xy * xy + _guard(xx))
+    x, y, z = third
+    if is_chosen:
+        first = (yy * zz - yz * yz, xz * yz - zz * xy, x)
+        second = (first[1], xx * zz - xz * xz, y)
+        # −1, 0 or 1 for the first, second or third column, over a number ≥ 1.
+        is_third, is_first = jnp.maximum(first[0], second[1]) < z, first[0] >= second[1]
+        index = (is_third.astype(x.dtype) - (is_first & ~is_third).astype(x.dtype)) / (1 + gram.p)
+        x, y, z = _mat3.where(index > 0, third, _mat3.where(index < 0, first, second))
+    length = z + jnp.sqrt(x * x + y * y + z * z)
+    x, y = computed_once((x, y), length)
+    return x, y
+
+
+class Images(NamedTuple):
+    """A e, A g and A n for the right-handed frame (e, g, n)."""
+
+    e: Vec3
+    g: Vec3
+    n: Vec3
+
+
+def reflected(a: Mat3, x: jax.Array, y: jax.Array) -> Images:
+    """The columns of A·(e, g, n), where 1 − 2 m mᵀ/‖m‖² of m = (x, y, 1) takes the axes to e, g and −n."""
+    columns = _mat3.transpose(a)
+    half = 0.5 * (x * x + y * y + 1)
+    one, two, three = a
+    am = (
+        one[0] * x + one[1] * y + one[2],
+        two[0] * x + two[1] * y + two[2],
+        three[0] * x + three[1] * y + three[2],
+    )
+    am = computed_once(am, half)
+    return Images(
+        _minus(columns[0], _mat3.scale_vector(am, x)),
+        _minus(columns[1], _mat3.scale_vector(am, y)),
+        _minus(am, columns[2]),
+    )
+
+
+def image_of_axis(images: Images, is_smallest: jax.Array, *, is_nearer: bool = True) -> Vec3:
+    """(x, y, s) parallel to u + s e₃‖u‖ for u = R n, s the sign of its third component; (0, 0, 1) where u = 0."""
+    x, y, z = _mat3.where(is_smallest, _mat3.cross(images.e, images.g), images.n)
+    length = jnp.abs(z) if is_nearer else z
+    x, y, z = computed_once(
+        (x, y, z), length + jnp.sqrt(_mat3.dot((x, y, z), (x, y, z))) + float(jnp.finfo(x.dtype).tiny)
+    )
+    return x, y, sign_of(z) if is_nearer else constant_like(z, 1)
+
+
+def half_angle(images: Images, axis: Vec3) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Cosine and sine of half the best angle about n, times one number, and tr(RᵀA).
+
+    The trace is u·An + c cos φ + d sin φ, at best u·An + √(c² + d²). Where all of c and d is rounding the angle is
+    arbitrary, but the same everywhere: c and d are computed_once.
+    """
+    x, y, s = axis
+    e, g, n = images
+    half = 0.5 * (x * x + y * y + 1)
+    me, mg = _mat3.dot(axis, e), _mat3.dot(axis, g)
+    c = (e[0] + s * g[1]) * half - (x * me + s * y * mg)
+    d = (s * e[1] - g[0]) * half - (s * y * me - x * mg)
+    c, d = computed_once((c, d), half)
+    best = jnp.sqrt(c * c + d * d)
+    large = best + jnp.abs(c) + _guard(c)
+    is_behind = c < 0
+    trace = best + (_mat3.dot(axis, n) / half - s * n[2])
+    return jnp.where(is_behind, d, large), jnp.where(is_behind, large, d), trace
+
+
+def quaternion(m: tuple[jax.Array, jax.Array], axis: Vec3, cosine: jax.Array, sine: jax.Array) -> Quaternion:
+    """The quaternion of R, any length but 0: (x', y', s) ∘ (cosine + sine k) ∘ (x, y, 1).
+
+    Two reflections are two half turns about their axes. Where s = −1 the second one goes to the other side: then it is
+    (x', −y', 1), and a half turn about e₁ comes last.
+    """
+    x, y = m
+    x1, y1, s = axis
+    y1 = s * y1
+    px, py = cosine * x - sine * y, cosine * y + sine * x
+    w = -(x1 * px + y1 * py + cosine)
+    i = y1 * cosine - py - x1 * sine
+    j = px - x1 * cosine - y1 * sine
+    k = x1 * py - y1 * px - sine
+    is_flipped = s < 0
+    q = (
+        jnp.where(is_flipped, -i, w),
+        jnp.where(is_flipped, w, i),
+        jnp.where(is_flipped, -k, j),
+        jnp.where(is_flipped, j, k),
+    )
+    return computed_once(q, jnp.abs(cosine) + jnp.abs(sine))
+
+
+def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kept: bool = True) -> Mat3:
+    """The matrix of q, orthogonal to some eps; A over its power of two where that is a rotation to √eps.
+
+    A rotation has been scaled by 2 or by 4: AᵀA is 4 or 16 times the identity and the trace 6 or 12, that of −R 2 or 4.
+    """
+    w, x, y, z = q
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    x2, y2, z2 = x + x, y + y, z + z
+    xy, xz, yz, wx, wy, wz = x2 * y, x2 * z, y2 * z, x2 * w, y2 * w, z2 * w
+    r = (
+        ((ww + xx) - (yy + zz), xy - wz, xz + wy),
+        (xy + wz, (ww + yy) - (xx + zz), yz - wx),
+        (xz - wy, yz + wx, (ww + zz) - (xx + yy)),
+    )
+    norm = ww + xx + yy + zz
+    if is_kept:
+        power = jnp.where(gram.xx < 8, 2.0, 4.0).astype(norm.dtype)
+        off = gram.xx - power * power
+        is_rotation = (gram.p * gram.p + off * off < 4 * float(jnp.finfo(norm.dtype).eps)) & (trace > 2 * power)
+        # The choice goes with the divisor, as its sign.
+        norm = computed_once(jnp.where(is_rotation, -power, norm))
+        r = _mat3.where(norm < 0, a, r)
+        norm = jnp.abs(norm)
+    return computed_once(r, norm)
+
+
+def _guard(x: jax.Array) -> float:
+    """Far below eps; its square is far above the smallest number."""
+    return float(jnp.finfo(x.dtype).tiny) ** 0.4
+
+
+def _minus(u: Vec3, v: Vec3) -> Vec3:
+    return (u[0] - v[0], u[1] - v[1], u[2] - v[2])
