@@ -41,7 +41,8 @@ def constant_like(x: jax.Array, value: float) -> jax.Array:
 
 def sign_of(x: jax.Array) -> jax.Array:
     """−1 where x < 0, +1 elsewhere: sign(0) counts as +1."""
-    return 1 - 2 * (x < 0).astype(x.dtype)
+    is_negative = (x < 0).astype(x.dtype)
+    return 1 - (is_negative + is_negative)
 
 
 def exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:

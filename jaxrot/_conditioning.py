@@ -5,6 +5,7 @@ import functools
 import jax
 from jax.typing import ArrayLike
 
+from jaxrot import _mat3
 from jaxrot._compiled import compiled
 from jaxrot._inputs import check_matrix
 from jaxrot._saturation import factor_of, gain
@@ -57,6 +58,6 @@ def _gap_jvp(order: int, primals, tangents):
     gap = _gap(matrix, order + 1)
     left, s, normalised, right = decomposed(matrix, order + 1)
     m = tangent_in_axes(left, matrix_dot, right)
-    factor = factor_of(matrix)
+    factor = factor_of(_mat3.components(matrix))
     norm = reciprocal_gaps(s, normalised, factor, order + 1).norm
     return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], normalised[..., 0]) * gain(factor, norm, order)

@@ -69,8 +69,8 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
 def _rotation_jacobian(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
     # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
     rotation = nearest(matrix, method, damping, 1)
-    inverse = inverse_gap_matrix(matrix, rotation, damping=damping)
-    return _quadratic_form(_mat3.components(rotation), inverse)
+    r = _mat3.components(rotation)
+    return _quadratic_form(r, inverse_gap_matrix(_mat3.components(matrix), r, damping=damping))
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
@@ -102,7 +102,7 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
 def _twist_modes(matrix: jax.Array) -> TwistModes:
     left, s, normalised, right = decomposed(matrix, 1)
     u, v = _mat3.components(left), _mat3.components(right)
-    factor = factor_of(matrix)
+    factor = factor_of(_mat3.components(matrix))
     gaps = reciprocal_gaps(s, normalised, factor, 1)
     eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * gain(factor, gaps.norm, 0)[..., None]
     axes = _mat3.identity_like(u)
@@ -142,9 +142,9 @@ def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
 
 @compiled
 def _arap_hessian(matrix: jax.Array, *, psd: bool) -> jax.Array:
-    rotation = nearest(matrix, DEFAULT_METHOD, 0.0, 1)
-    inverse = _mat3.components(_clamped(matrix)) if psd else inverse_gap_matrix(matrix, rotation)
-    jacobian = _quadratic_form(_mat3.components(rotation), inverse)
+    r = _mat3.components(nearest(matrix, DEFAULT_METHOD, 0.0, 1))
+    inverse = _mat3.components(_clamped(matrix)) if psd else inverse_gap_matrix(_mat3.components(matrix), r)
+    jacobian = _quadratic_form(r, inverse)
     return 2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)
 
 
@@ -165,8 +165,8 @@ def _clamped_jvp(primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
     left, s, _, right = decomposed(matrix, 1)
     v = _mat3.components(right)
-    rotation = _mat3.stack(_mat3.multiply(_mat3.components(left), _mat3.transpose(v)))
-    stretch_dot = _mat3.components(stretch_tangent(matrix, rotation, matrix_dot, order=1))
+    rotation = _mat3.multiply(_mat3.components(left), _mat3.transpose(v))
+    stretch_dot = stretch_tangent(_mat3.components(matrix), rotation, _mat3.components(matrix_dot), order=1)
     h_dot = _mat3.gap_matrix(_mat3.transpose_multiply(v, _mat3.multiply(stretch_dot, v)))
     gaps = _gaps(s)
     tangent = [_mat3.multiply_entries(row, _slopes(gap, gaps)) for row, gap in zip(h_dot, gaps, strict=True)]

@@ -27,20 +27,19 @@ _RESOLVED = 64
 def rotation_tangent(
     matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, damping: float = 0.0, order: int = 0
 ) -> jax.Array:
-    """The tangent Ṙ = R[ω]× of the nearest rotation; arguments as for `angular_tangent`, result of A's shape."""
-    omega = angular_tangent(matrix, rotation, matrix_dot, damping=damping, order=order)
-    return _mat3.stack(_mat3.multiply(_mat3.components(rotation), _mat3.skew(omega)))
+    """The tangent Ṙ = R[ω]× of the nearest rotation, for three arrays (..., 3, 3); see `angular_tangent`."""
+    r = _mat3.components(rotation)
+    omega = angular_tangent(_mat3.components(matrix), r, _mat3.components(matrix_dot), damping=damping, order=order)
+    return _mat3.stack(_mat3.multiply(r, _mat3.skew(omega)))
 
 
-def angular_tangent(
-    matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, damping: float = 0.0, order: int = 0
-) -> Vec3:
+def angular_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, damping: float = 0.0, order: int = 0) -> Vec3:
     """The angular velocity ω, in the body frame, of the nearest rotation R of A along Ȧ; linear in Ȧ.
 
     Args:
-        matrix: A, shape (..., 3, 3), any scale.
-        rotation: R, the nearest rotation of A, same shape and dtype.
-        matrix_dot: Ȧ, same shape and dtype.
+        matrix: A, any scale.
+        rotation: R, the nearest rotation of A.
+        matrix_dot: Ȧ.
         damping: δ/tr S where that is more than the 64 eps that are always there.
         order: How many derivatives have been taken before this one. It only decides where saturation begins, see
             `_saturation.gain`.
@@ -48,58 +47,56 @@ def angular_tangent(
     Returns:
         ω on components. Finite for every finite A, and its derivatives too.
     """
-    torque = _mat3.axial(_mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot)))
+    torque = _mat3.axial(_mat3.transpose_multiply(rotation, matrix_dot))
     gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
-    return scaled_response(
-        functools.partial(_mat3.apply, gaps.inverse), torque, gain(factor_of(matrix), gaps.norm, order)
-    )
+    return scaled_response(functools.partial(_mat3.apply, gaps.inverse), torque, gain(gaps.factor, gaps.norm, order))
 
 
-def stretch_tangent(matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, order: int = 0) -> jax.Array:
-    """The tangent Ṡ = RᵀȦ − [ω]× S of the stretch S = RᵀA; arguments and shapes as for `rotation_tangent`.
+def stretch_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, order: int = 0) -> Mat3:
+    """The tangent Ṡ = RᵀȦ − [ω]× S of the stretch S = RᵀA; arguments as for `angular_tangent`.
 
     It does not depend on the scale of A, so that it is right at every scale: ω and S are those of the normalised A.
     """
-    along = _mat3.transpose_multiply(_mat3.components(rotation), _mat3.components(matrix_dot))
+    along = _mat3.transpose_multiply(rotation, matrix_dot)
     gaps = _inverse_gaps(matrix, rotation, 0.0, order + 1)
     omega = _mat3.apply(gaps.inverse, _mat3.axial(along))
     turn = _mat3.multiply(_mat3.skew(omega), gaps.stretch)
-    return _mat3.stack(_mat3.symmetric(_mat3.subtract(along, turn)))
+    return _mat3.symmetric(_mat3.subtract(along, turn))
 
 
-def inverse_gap_matrix(matrix: jax.Array, rotation: jax.Array, *, damping: float = 0.0) -> Mat3:
+def inverse_gap_matrix(matrix: Mat3, rotation: Mat3, *, damping: float = 0.0) -> Mat3:
     """H⁻¹ on components, damped and saturated as in `angular_tangent`, whose arguments it takes."""
     gaps = _inverse_gaps(matrix, rotation, damping, 1)
-    return _mat3.scale(gaps.inverse, gain(factor_of(matrix), gaps.norm, 0))
+    return _mat3.scale(gaps.inverse, gain(gaps.factor, gaps.norm, 0))
 
 
 class _InverseGaps(NamedTuple):
-    """What the rule needs of the normalised A: (H+iδ)⁻¹ = `inverse` − i·`unresolved`, its norm, and the stretch S."""
+    """What the rule needs: (H+iδ)⁻¹ = `inverse` − i·`unresolved`, its norm and the stretch S, all of A·`factor`."""
 
     inverse: Mat3
     unresolved: Mat3
     norm: jax.Array
     stretch: Mat3
+    factor: jax.Array
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3))
-def _inverse_gaps(matrix: jax.Array, rotation: jax.Array, damping: float, order: int) -> _InverseGaps:
+def _inverse_gaps(matrix: Mat3, rotation: Mat3, damping: float, order: int) -> _InverseGaps:
     """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `gain`."""
-    normalised = _mat3.scale(_mat3.components(matrix), factor_of(matrix))
-    stretch = _mat3.transpose_multiply(_mat3.components(rotation), normalised)
-    return _InverseGaps(
-        *damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping)), stretch
-    )
+    factor = factor_of(matrix)
+    stretch = _mat3.transpose_multiply(rotation, _mat3.scale(matrix, factor))
+    inverse = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping))
+    return _InverseGaps(*inverse, stretch, factor)
 
 
 @_inverse_gaps.defjvp
 def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
     (matrix, rotation), (matrix_dot, _) = primals, tangents
     gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
-    stretch_dot = _mat3.components(stretch_tangent(matrix, rotation, matrix_dot, order=order))
+    stretch_dot = stretch_tangent(matrix, rotation, matrix_dot, order=order)
     # Half of the gain on either side of the product: reverse mode meets each factor first in one of its terms, and all
     # of the gain on one side comes too late for another.
-    scale = gain(factor_of(matrix), gaps.norm, order)
+    scale = gain(gaps.factor, gaps.norm, order)
     before, after = halves(scale)
     halved_dot = _mat3.scale(stretch_dot, before)
     # δ is linear in |tr S|.
@@ -116,6 +113,7 @@ def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
         _mat3.symmetric(_mat3.subtract(_mat3.multiply(p, y), _mat3.multiply(q, x))),
         jnp.zeros_like(gaps.norm),
         _mat3.scale(stretch_dot, scale),
+        jnp.zeros_like(gaps.factor),
     )
     return gaps, tangent
 

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from jaxrot._choice import constant_like
 
@@ -19,14 +20,18 @@ _Tree = TypeVar("_Tree", Vec3, Mat3)
 
 
 def components(matrix: jax.Array) -> Mat3:
-    """Splits (..., 3, 3) into its nine entries."""
-    row = [(matrix[..., i, 0], matrix[..., i, 1], matrix[..., i, 2]) for i in range(3)]
-    return row[0], row[1], row[2]
+    """Splits (..., 3, 3) into its nine entries.
+
+    By splits and not by indices: their transposes join where those of `matrix[..., i, j]` add nine padded arrays.
+    """
+    x, y, z = (vector_components(lax.squeeze(row, [row.ndim - 2])) for row in lax.split(matrix, (1, 1, 1), -2))
+    return x, y, z
 
 
 def vector_components(vector: jax.Array) -> Vec3:
     """Splits (..., 3) into its three entries."""
-    return vector[..., 0], vector[..., 1], vector[..., 2]
+    x, y, z = (lax.squeeze(entry, [vector.ndim - 1]) for entry in lax.split(vector, (1, 1, 1), -1))
+    return x, y, z
 
 
 def stack(m: Mat3) -> jax.Array:
@@ -129,8 +134,9 @@ def squared_norm(m: Mat3) -> jax.Array:
 
 
 def symmetric(m: Mat3) -> Mat3:
-    """The symmetric part (m + mᵀ)/2."""
-    return scale(add(m, transpose(m)), 0.5)
+    """The symmetric part (m + mᵀ)/2, symmetric bit for bit."""
+    xy, xz, yz = (m[0][1] + m[1][0]) * 0.5, (m[0][2] + m[2][0]) * 0.5, (m[1][2] + m[2][1]) * 0.5
+    return ((m[0][0], xy, xz), (xy, m[1][1], yz), (xz, yz, m[2][2]))
 
 
 def axial(m: Mat3) -> Vec3:

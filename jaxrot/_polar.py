@@ -7,11 +7,12 @@ import jax
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._compiled import compiled, exportable
 from jaxrot._derivative import stretch_tangent
 from jaxrot._inputs import check_choice, check_matrix
 from jaxrot._nearest import nearest
-from jaxrot._scaling import power_of_two, scaled
+from jaxrot._scaling import scaled, unscaled
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
@@ -73,10 +74,12 @@ def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
     m = _mat3.components(matrix)
     # Scaled, a sum of three products does not overflow where S does not.
     product = _mat3.transpose_multiply(_mat3.components(rotation), scaled(m))
-    return _mat3.stack(_mat3.scale(_mat3.symmetric(product), power_of_two(m)))
+    # Once, or XLA:CPU rounds an entry and its mirror image differently.
+    return _mat3.stack(unscaled(computed_once(_mat3.symmetric(product)), m))
 
 
 @_stretch.defjvp
 def _stretch_jvp(order: int, primals, tangents):
     (matrix, rotation), (matrix_dot, _) = primals, tangents
-    return _stretch(matrix, rotation, order + 1), stretch_tangent(matrix, rotation, matrix_dot, order=order)
+    tangent = stretch_tangent(*map(_mat3.components, (matrix, rotation, matrix_dot)), order=order)
+    return _stretch(matrix, rotation, order + 1), _mat3.stack(tangent)

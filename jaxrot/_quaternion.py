@@ -90,14 +90,24 @@ def to_rotation(q: Quaternion) -> Mat3:
     )
 
 
+def to_matrix(q: Quaternion) -> jax.Array:
+    """The rotation of a quaternion of any length but 0, (..., 3, 3), orthogonal to 2 eps.
+
+    `to_rotation` alone is so to 10 eps, and to 17 where quotients are 2 ulp off.
+    """
+    return _mat3.stack(_mat3.newton_schulz(to_rotation(q)))
+
+
 def to_scaled_rotation(q: Quaternion) -> Mat3:
     """The rotation of a quaternion times its squared length: for what divides last, or not at all."""
     w, x, y, z = q
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    x2, y2, z2 = x + x, y + y, z + z
+    xy, xz, yz, wx, wy, wz = x2 * y, x2 * z, y2 * z, x2 * w, y2 * w, z2 * w
     return (
-        (ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz),
+        ((ww + xx) - (yy + zz), xy - wz, xz + wy),
+        (xy + wz, (ww + yy) - (xx + zz), yz - wx),
+        (xz - wy, yz + wx, (ww + zz) - (xx + yy)),
     )
 
 

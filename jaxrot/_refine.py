@@ -154,7 +154,7 @@ def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Option
     # The shift is the scale c of the start c·Q: without it the columns are multiples of Q's quaternion at c = 1 only.
     columns = _quaternion.davenport_columns(start, safe_sqrt(_mat3.squared_norm(start) / 3))
     refined = _refine(matrix, _quaternion.largest_column(columns), options)
-    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(refined)))
+    return _quaternion.to_matrix(_quaternion.components(refined))
 
 
 @compiled
@@ -196,7 +196,7 @@ def _refined_jvp(step: str, iterations: int, escape: bool, order: int, primals, 
     (matrix, quaternion), (matrix_dot, _) = primals, tangents
     refined = _refined(matrix, quaternion, step, iterations, escape, order + 1)
     q = _quaternion.components(refined)
-    rotation = _mat3.stack(_quaternion.to_rotation(q))
-    x, y, z = angular_tangent(matrix, rotation, matrix_dot, order=order)
+    rotation = _quaternion.to_rotation(q)
+    x, y, z = angular_tangent(_mat3.components(matrix), rotation, _mat3.components(matrix_dot), order=order)
     zero = x - x
     return refined, 0.5 * _quaternion.stack(_quaternion.product(q, (zero, x, y, z)))

@@ -10,13 +10,13 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
-from jaxrot._mat3 import Vec3
+from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._scaling import power_of_two_factor
 
 
-def factor_of(matrix: jax.Array) -> jax.Array:
+def factor_of(matrix: Mat3) -> jax.Array:
     """The power of two that normalises A; 0 where A = 0, which makes every derivative there 0."""
-    magnitude = _mat3.largest_entry(_mat3.components(lax.stop_gradient(matrix)))
+    magnitude = _mat3.largest_entry(lax.stop_gradient(matrix))
     return jnp.where(magnitude == 0, jnp.zeros_like(magnitude), power_of_two_factor(magnitude))
 
 
@@ -28,10 +28,11 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
 
     Args:
         factor: The power of two that normalises A, or 0.
-        norm: That of the linear map to which the factor belongs, of the normalised A. A constant to differentiation.
+        norm: That of the linear map to which the factor belongs, of the normalised A. Both are constants to
+            differentiation.
         order: How many derivatives have been taken before this one.
     """
-    norm = lax.stop_gradient(norm)
+    factor, norm = lax.stop_gradient((factor, norm))
     largest = 2.0 ** (jnp.finfo(factor.dtype).maxexp - 4)
     # 1 instead of 0 keeps every quotient finite.
     is_zero = factor == 0

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 
 _Tree = TypeVar("_Tree")
@@ -26,40 +27,40 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
         The factor, same shape. For 0 and subnormal numbers it is the largest power of two there is; for inf and NaN it
         is 0, and inf·0 is NaN. It is a constant to differentiation.
     """
-    info = jnp.finfo(magnitude.dtype)
-    mask = ((1 << int(info.nexp)) - 1) << int(info.nmant)
-    normal = jnp.maximum(lax.stop_gradient(magnitude), float(info.tiny))
-    exponent = lax.bitcast_convert_type(normal, jnp.dtype(f"int{info.bits}")) & mask
+    exponent, mask = _exponent(magnitude)
     return lax.bitcast_convert_type(mask - exponent, magnitude.dtype)
 
 
-def power_of_two(m: object) -> jax.Array:
-    """The power of two that brings the largest entry into [1, 2) when it divides all of them.
-
-    Where that is not finite it is NaN; for 0 and subnormal numbers it is the smallest normal one. It is a constant to
-    differentiation.
-    """
-    largest = _mat3.largest_entry(lax.stop_gradient(m))
-    info = jnp.finfo(largest.dtype)
-    integer = jnp.dtype(f"int{info.bits}")
-    normal = jnp.maximum(largest, float(info.tiny))
-    fraction = lax.bitcast_convert_type(normal, integer) & ((1 << int(info.nmant)) - 1)
-    one = lax.bitcast_convert_type(jnp.ones_like(normal), integer)
-    # Of inf the mantissa is 1 too; inf/inf makes the power NaN.
-    mantissa = jnp.where(normal == jnp.inf, normal, lax.bitcast_convert_type(fraction | one, normal.dtype))
-    # The maximum keeps XLA from turning x/(y/z) into (x z)/y, which rounds, and overflows at the largest numbers.
-    return jnp.maximum(normal / mantissa, float(info.tiny))
-
-
 def scaled(m: _Tree) -> _Tree:
-    """The entries of a matrix or quaternion over the power of two that brings the largest one into [1, 2).
+    """The entries of a matrix or quaternion times the power of two that brings the largest one into [2, 4).
 
     Where one is not finite all are NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
-    bit. The entries are quotients, which XLA:CPU stores, one array each; a product it would form again from the
-    (..., 3, 3) array in every pass, with the largest entry: the default method took 1.2 times as long.
+    bit. The power is made of bits: on accelerators quotients are not exact, and the reciprocal of a number above 2¹²⁶
+    may be 0.
     """
-    power = power_of_two(m)
-    return jax.tree.map(lambda entry: entry / power, m)
+    factor = power_of_two_factor(_size(m))
+    return jax.tree.map(lambda entry: entry * factor, m)
+
+
+def unscaled(values: _Tree, m: object) -> _Tree:
+    """What belongs to the `scaled` entries of m, in the unit of m again."""
+    size = _size(m)
+    # Half of it first: the factor of the largest numbers has a reciprocal, that of the smallest has none.
+    power = lax.bitcast_convert_type(_exponent(size)[0], size.dtype)
+    return jax.tree.map(lambda value: (value * 0.5) * power, values)
+
+
+def _size(m: object) -> jax.Array:
+    # The same wherever it decides about a power of two, also where quotients are inexact.
+    return computed_once(_mat3.largest_entry(m))
+
+
+def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
+    """The bits of the exponent of a number ≥ 0, no less than that of the smallest normal one, and the mask of them."""
+    info = jnp.finfo(magnitude.dtype)
+    mask = ((1 << int(info.nexp)) - 1) << int(info.nmant)
+    normal = jnp.maximum(lax.stop_gradient(magnitude), float(info.tiny))
+    return lax.bitcast_convert_type(normal, jnp.dtype(f"int{info.bits}")) & mask, mask
 
 
 def unit_scaled(m: Mat3) -> Mat3:

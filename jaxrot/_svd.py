@@ -8,13 +8,14 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
+from jaxrot._choice import computed_once
 from jaxrot._compiled import compiled, exportable
 from jaxrot._complex import Complex, multiply, reciprocal, square, times
 from jaxrot._derivative import resolved_gap
 from jaxrot._inputs import check_matrix
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._saturation import factor_of, gain, halves, scaled_response
-from jaxrot._scaling import power_of_two, scaled
+from jaxrot._scaling import scaled, unscaled
 from jaxrot._symmetric import eigen
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
@@ -123,9 +124,8 @@ def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax
     left = _mat3.newton_schulz(_mat3.multiply(rotation, right))
     # Rounding may have left the order broken: s2 by a few eps below |s3|, or negative.
     s2 = jnp.maximum(values[1], jnp.abs(values[2]))
-    s = jnp.stack((jnp.maximum(values[0], s2), s2, values[2]), axis=-1)
-    # notation: the scaled A is in [1, 2), the normalised one, which derivatives use, in [2, 4), and 0 for 0.
-    return _mat3.stack(left), s * power_of_two(m)[..., None], s * 2, _mat3.stack(right)
+    s = computed_once((jnp.maximum(values[0], s2), s2, values[2]))
+    return _mat3.stack(left), jnp.stack(unscaled(s, m), axis=-1), jnp.stack(s, axis=-1), _mat3.stack(right)
 
 
 @decomposed.defjvp
@@ -136,7 +136,7 @@ def _decomposed_jvp(order: int, primals, tangents):
     s_dot = jnp.stack((m[0][0], m[1][1], m[2][2]), axis=-1)
 
     # notation: U̇ = U [p+w]×/2, V̇ = V [p−w]×/2: w is the angular velocity of U Vᵀ, in the axes V.
-    factor = factor_of(matrix)
+    factor = factor_of(_mat3.components(matrix))
     gaps = reciprocal_gaps(s, normalised, factor, order + 1)
     scale = gain(factor, gaps.norm, order)
     mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])

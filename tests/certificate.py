@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxrot import METHODS
 from jaxrot.families import FAMILIES
 from jaxrot.measuring import reference
 
@@ -103,6 +104,15 @@ def resolved(batch: Batch, limit: float | None = None) -> np.ndarray:
     """Which matrices have κ below the limit, 1/(8 eps) when absent, and survive flushing."""
     limit = 1 / (8 * np.finfo(batch.matrices.dtype).eps) if limit is None else limit
     return (batch.condition < limit) & survives_flushing(batch)
+
+
+def within_domain(method: str, batch: Batch) -> np.ndarray:
+    """The matrices for which the method's record promises 8 eps (1+κ)."""
+    record = METHODS[method]
+    where = resolved(batch, record.condition_limit[batch.matrices.dtype.name])
+    if not record.handles_inversion:
+        where &= batch.singular_values[:, 2] > 0
+    return where
 
 
 def analytic_jacobian(matrices, damping=0.0):

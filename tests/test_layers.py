@@ -86,6 +86,7 @@ def test_the_core_imports_jax_and_numpy_alone(path):
             "random",
             "time",
             "types",
+            "warnings",
             "typing",
             "zlib",
         }

@@ -5,7 +5,15 @@ import functools
 import jax
 import numpy as np
 import pytest
-from certificate import assert_contract, assert_forward_error, assert_rotations, family_batch, in_families, resolved
+from certificate import (
+    assert_contract,
+    assert_forward_error,
+    assert_rotations,
+    family_batch,
+    in_families,
+    resolved,
+    within_domain,
+)
 
 from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation
 from jaxrot.families import LARGE_BATCH
@@ -23,15 +31,6 @@ def transformed(method, transform):
         "vmap": jax.vmap(function),
         "jit∘vmap": jax.jit(jax.vmap(function)),
     }[transform]
-
-
-def within_domain(method, batch):
-    """The matrices for which the method's record promises 8 eps (1+κ)."""
-    record = METHODS[method]
-    where = resolved(batch, record.condition_limit[batch.matrices.dtype.name])
-    if not record.handles_inversion:
-        where &= batch.singular_values[:, 2] > 0
-    return where
 
 
 @pytest.mark.parametrize("dtype", DTYPES)

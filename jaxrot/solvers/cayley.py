@@ -28,4 +28,4 @@ def solve(matrix: jax.Array) -> jax.Array:
         jnp.where(sign < 0, -length, length)
         for sign, length in zip(signs, map(safe_sqrt, lengths_squared), strict=True)
     )
-    return _mat3.stack(_quaternion.to_rotation((w, x, y, z)))
+    return _quaternion.to_matrix((w, x, y, z))

@@ -24,4 +24,4 @@ def solve(matrix: jax.Array) -> jax.Array:
     """
     columns = _quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))
     _, vectors = jnp.linalg.eigh(jnp.stack([_quaternion.stack(column) for column in columns], axis=-1))
-    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(vectors[..., :, -1])))
+    return _quaternion.to_matrix(_quaternion.components(vectors[..., :, -1]))

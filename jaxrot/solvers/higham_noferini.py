@@ -38,7 +38,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     cofactor = _mat3.cofactor(a)
     f = largest_root(cofactor, _mat3.squared_norm(a), _mat3.dot(a[0], cofactor[0]))
     q = null_vector(_quaternion.davenport_columns(_mat3.scale(a, -1.0), f))
-    return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
+    return _quaternion.to_matrix(q)
 
 
 def null_vector(columns: Columns) -> Quaternion:

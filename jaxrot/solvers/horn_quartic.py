@@ -27,7 +27,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     a = unit_scaled(_mat3.components(matrix))
     columns = _quaternion.davenport_columns(_mat3.scale(a, -1.0), quartic_root(a))
     q = _quaternion.normalise(_quaternion.largest_column(_quaternion.adjugate(columns)))
-    return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
+    return _quaternion.to_matrix(q)
 
 
 def quartic_root(a: Mat3) -> jax.Array:

@@ -52,7 +52,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     u2 = tuple(jnp.where(is_flat, x, y) for x, y in zip(product, reflected, strict=True))
     is_line = (s[0] < limit) | (s[1] < limit) | (limit == 0)
     left = _mat3.where(is_line, _mat3.identity_like(a), _mat3.transpose((u0, u1, (u2[0], u2[1], u2[2]))))
-    return _mat3.stack(_mat3.multiply(left, axes))
+    return _mat3.stack(_mat3.newton_schulz(_mat3.multiply(left, axes)))
 
 
 def _rolled(condition: jax.Array, v: Vec3) -> Vec3:

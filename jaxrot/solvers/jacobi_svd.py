@@ -37,7 +37,7 @@ def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     columns; the number of sweeps is fixed.
 
     Args:
-        a: On components, the largest entry between 1 and 2 or zero (`scaled`).
+        a: On components, the largest entry between 2 and 4 or zero (`scaled`).
 
     Returns:
         (left, s, right): left and right rotations, s3 < 0 iff det a < 0.

@@ -34,10 +34,11 @@ def solve(matrix: jax.Array) -> jax.Array:
     products = (_quaternion.dot((w, x, y, z), column) for column in columns)
     zero = constant_like(w, 0)
     weights = (jnp.where(product < 0, 2.0**i, zero) for i, product in enumerate(products))
-    signs = computed_once(functools.reduce(jnp.add, weights)).astype(jnp.int32)
+    # The half: a quotient is off by an ulp or two on accelerators, and the conversion truncates.
+    signs = (computed_once(functools.reduce(jnp.add, weights)) + 0.5).astype(jnp.int32)
     w, x, y, z = (_signed((signs >> i & 1) == 1, column) for i, column in enumerate(columns))
     # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.
-    return _mat3.stack(_quaternion.to_rotation(_sum((w, x, y, z))))
+    return _quaternion.to_matrix(_sum((w, x, y, z)))
 
 
 def solve_simply(matrix: jax.Array) -> jax.Array:
@@ -55,9 +56,7 @@ def solve_simply(matrix: jax.Array) -> jax.Array:
     Cost: 115 flops and one square root, for the scale.
     Source: Sarabandi et al. 2020, eq. (29), given there as what not to do. The scale is removed as in `solve`.
     """
-    return _mat3.stack(
-        _quaternion.to_rotation(_sum(_quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))))
-    )
+    return _quaternion.to_matrix(_sum(_quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))))
 
 
 def _sum(columns: Columns) -> Quaternion:

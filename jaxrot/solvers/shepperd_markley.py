@@ -23,4 +23,4 @@ def solve(matrix: jax.Array) -> jax.Array:
     """
     columns = _quaternion.davenport_columns(unit_scaled(_mat3.components(matrix)))
     # Never 0: the four diagonal entries add up to 4.
-    return _mat3.stack(_quaternion.to_rotation(_quaternion.largest_column(columns)))
+    return _quaternion.to_matrix(_quaternion.largest_column(columns))

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3
+from jaxrot import _mat3, _quaternion
 from jaxrot._choice import computed_once, constant_like, sign_of
 from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import power_of_two_factor
+from jaxrot._scaling import scaled
 
 # The stages that keep a promise each and that `solve` can leave out, to see what they cost.
 GUARDS = ("scale", "largest column", "nearer reflection", "rotations as they are", "renormalisation")
@@ -51,7 +51,7 @@ def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
     """
     a = _mat3.components(matrix)
     if "scale" not in without:
-        a = _mat3.scale(a, power_of_two_factor(computed_once(_mat3.largest_entry(a))))
+        a = scaled(a)
     gram = deviator(a)
     outer = outer_eigenvalue(gram)
     x, y = eigenvector(gram, outer, is_chosen="largest column" not in without)
@@ -125,9 +125,11 @@ def eigenvector(gram: Deviator, eigenvalue: jax.Array, *, is_chosen: bool = True
     if is_chosen:
         first = (yy * zz - yz * yz, xz * yz - zz * xy, x)
         second = (first[1], xx * zz - xz * xz, y)
-        # −1, 0 or 1 for the first, second or third column, over a number ≥ 1.
+        # −1 for the first column, 0 for the second, 1 or 2 for the third, over a number ≥ 1.
         is_third, is_first = jnp.maximum(first[0], second[1]) < z, first[0] >= second[1]
-        index = (is_third.astype(x.dtype) - (is_first & ~is_third).astype(x.dtype)) / (1 + gram.p)
+        third_chosen = is_third.astype(x.dtype)
+        index = third_chosen + third_chosen - is_first.astype(x.dtype)
+        index = computed_once(index, 1 + gram.p)
         x, y, z = _mat3.where(index > 0, third, _mat3.where(index < 0, first, second))
     length = z + jnp.sqrt(x * x + y * y + z * z)
     x, y = computed_once((x, y), length)
@@ -219,18 +221,10 @@ def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kep
 
     A rotation has been scaled by 2 or by 4: AᵀA is 4 or 16 times the identity and the trace 6 or 12, that of −R 2 or 4.
     """
-    w, x, y, z = q
-    ww, xx, yy, zz = w * w, x * x, y * y, z * z
-    x2, y2, z2 = x + x, y + y, z + z
-    xy, xz, yz, wx, wy, wz = x2 * y, x2 * z, y2 * z, x2 * w, y2 * w, z2 * w
-    r = (
-        ((ww + xx) - (yy + zz), xy - wz, xz + wy),
-        (xy + wz, (ww + yy) - (xx + zz), yz - wx),
-        (xz - wy, yz + wx, (ww + zz) - (xx + yy)),
-    )
-    norm = ww + xx + yy + zz
+    r, norm = _quaternion.to_scaled_rotation(q), _quaternion.squared_norm(q)
     if is_kept:
-        power = jnp.where(gram.xx < 8, 2.0, 4.0).astype(norm.dtype)
+        is_large = (gram.xx > 8).astype(norm.dtype)
+        power = 2 + (is_large + is_large)
         off = gram.xx - power * power
         is_rotation = (gram.p * gram.p + off * off < 4 * float(jnp.finfo(norm.dtype).eps)) & (trace > 2 * power)
         # The choice goes with the divisor, as its sign.

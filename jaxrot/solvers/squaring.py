@@ -41,7 +41,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     q = _quaternion.normalise(_quaternion.largest_column(_quaternion.davenport_columns(h)))
     for _ in range(_POLISHING_STEPS):
         q = polish(a, q)
-    return _mat3.stack(_mat3.newton_schulz(_quaternion.to_rotation(q)))
+    return _quaternion.to_matrix(q)
 
 
 def polish(a: Mat3, q: Quaternion) -> Quaternion:

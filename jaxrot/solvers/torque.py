@@ -27,4 +27,4 @@ def solve(matrix: jax.Array) -> jax.Array:
     """
     a = unit_scaled(_mat3.components(matrix))
     q = iterate(torque.correction, a, _quaternion.from_rotation(a), _ITERATIONS)
-    return _mat3.stack(_quaternion.to_rotation(q))
+    return _quaternion.to_matrix(q)
