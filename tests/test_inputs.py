@@ -17,10 +17,12 @@ FUNCTIONS = {
     "refine_rotation": lambda a: refine_rotation(a, np.eye(3)),
     "refine_quaternion_wxyz": lambda a: refine_quaternion_wxyz(a, np.eye(4)[0]),
 }
-COMPUTED = {**FUNCTIONS, "all parts": all_parts}
 # What is refused is refused while tracing and compiles nothing: here every function has its turn.
 REFUSING = {**FUNCTIONS, **PARTS}
-all_functions = pytest.mark.parametrize("function", COMPUTED.values(), ids=COMPUTED.keys())
+ALL_PARTS = pytest.param(all_parts, id="all parts", marks=pytest.mark.exhaustive)
+all_functions = pytest.mark.parametrize(
+    "function", [*(pytest.param(function, id=name) for name, function in FUNCTIONS.items()), ALL_PARTS]
+)
 all_gates = pytest.mark.parametrize("function", REFUSING.values(), ids=REFUSING.keys())
 
 
@@ -181,7 +183,7 @@ def test_a_start_of_the_wrong_shape_is_refused():
 @pytest.mark.parametrize("dtype", ["float32", pytest.param("float64", marks=pytest.mark.exhaustive)])
 def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(value, dtype):
     clean = A.astype(dtype)
-    for function in map(jax.jit, COMPUTED.values()):
+    for function in map(jax.jit, [*FUNCTIONS.values(), all_parts]):
         expected = np.delete(np.asarray(function(clean)), 1, 0)
         for entry in range(9):
             spoiled = clean.copy()
@@ -191,19 +193,14 @@ def test_a_matrix_that_is_not_finite_gives_nan_and_leaves_its_neighbours_alone(v
             np.testing.assert_array_equal(np.delete(result, 1, 0), expected)
 
 
-def test_every_public_function_works_without_x64():
+@all_functions
+def test_it_works_without_x64(function):
     jax.config.update("jax_enable_x64", False)
     try:
-        for name, function in COMPUTED.items():
-            for matrices in (
-                A,
-                A.astype(np.float32),
-                [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-                jnp.ones((3, 3), jnp.bfloat16),
-            ):
-                result = function(matrices)
-                assert np.isfinite(np.asarray(result, np.float32)).all(), name
-                assert result.dtype in (jnp.float32, jnp.bfloat16)
+        for matrices in (A, A.astype(np.float32), [[1, 0, 0], [0, 1, 0], [0, 0, 1]], jnp.ones((3, 3), jnp.bfloat16)):
+            result = function(matrices)
+            assert np.isfinite(np.asarray(result, np.float32)).all()
+            assert result.dtype in (jnp.float32, jnp.bfloat16)
         jacobian = jax.jacrev(nearest_rotation)(jnp.asarray(A))
         assert jacobian.dtype == jnp.float32
     finally:
