@@ -180,7 +180,7 @@ def _iterated(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: i
     q = (w + zero, x + zero, y + zero, z + zero)
     if escape:
         q = leave_equilibrium(a, q)
-    return _quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
+    return _quaternion.stack(_quaternion.renormalise(iterate(STEPS[step].correction, a, q, iterations)))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
