@@ -105,7 +105,7 @@ def to_matrix(q: Quaternion) -> jax.Array:
 
     `to_rotation` alone is so to 10 eps, and to 17 where quotients are 2 ulp off.
     """
-    return _mat3.stack(_mat3.newton_schulz(to_rotation(q)))
+    return _mat3.stack(_mat3.newton_schulz(computed_once(to_scaled_rotation(q), squared_norm(q))))
 
 
 def to_scaled_rotation(q: Quaternion) -> Mat3:

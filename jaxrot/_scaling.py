@@ -66,8 +66,8 @@ def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
 def unit_scaled(m: Mat3) -> Mat3:
     """The matrix with the Frobenius norm √3 of a rotation; a zero matrix stays zero."""
     m = scaled(m)
-    norm = safe_sqrt(_mat3.squared_norm(m))
-    return _mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm))
+    size = safe_sqrt(_mat3.squared_norm(m) * (1 / 3))
+    return computed_once(m, jnp.where(size == 0, jnp.ones_like(size), size))
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
