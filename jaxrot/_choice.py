@@ -15,10 +15,13 @@ _Tree = TypeVar("_Tree")
 
 
 def computed_once(values: _Tree, divisor: jax.Array | None = None) -> _Tree:
-    """The values, one array or several, over a divisor; over a 1 that XLA does not see through when absent.
+    """The values, one array or several, over a divisor; on a CPU over a 1 that XLA does not see through when absent.
 
-    That saves time too where they are used more than once: XLA:CPU stores quotients and forms all else again.
+    That saves time too where they are used more than once: XLA:CPU stores quotients and forms all else again. Other
+    backends compute a kernel's values once, and there one reciprocal serves them all.
     """
+    if jax.default_backend() != "cpu":
+        return values if divisor is None else jax.tree.map(lambda value: value * (1 / divisor), values)
     if divisor is None:
         divisor = constant_like(jax.tree.leaves(values)[0], 1)
     return jax.tree.map(lambda value: value / divisor, values)

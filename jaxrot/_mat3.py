@@ -35,7 +35,12 @@ def vector_components(vector: jax.Array) -> Vec3:
 
 
 def stack(m: Mat3) -> jax.Array:
-    """Joins nine entries into (..., 3, 3)."""
+    """Joins nine entries into (..., 3, 3).
+
+    On GPUs and TPUs behind a barrier, or the kernel that joins them evaluates what they come from once for each.
+    """
+    if jax.default_backend() != "cpu":
+        m = lax.optimization_barrier(m)
     return jnp.stack([jnp.stack(row, axis=-1) for row in m], axis=-2)
 
 

@@ -66,8 +66,9 @@ def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
 def unit_scaled(m: Mat3) -> Mat3:
     """The matrix with the Frobenius norm √3 of a rotation; a zero matrix stays zero."""
     m = scaled(m)
-    size = safe_sqrt(_mat3.squared_norm(m) * (1 / 3))
-    return computed_once(m, jnp.where(size == 0, jnp.ones_like(size), size))
+    norm = safe_sqrt(_mat3.squared_norm(m))
+    # Exactly 1 for a rotation: with another form `taylor` rounds every entry, and drifts twice as far.
+    return computed_once(_mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm)))
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:

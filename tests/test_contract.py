@@ -1,6 +1,7 @@
 """The contract of the default method, sought to be broken: many matrices, bit patterns, hypothesis."""
 
 import functools
+import itertools
 
 import hypothesis
 import hypothesis.extra.numpy as arrays
@@ -122,6 +123,42 @@ def test_every_stage_is_needed(guard):
     part = Batch(*(entry[where] for entry in batch))
     with pytest.raises(AssertionError):
         assert_contract(rotation[where], part)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_rotation_comes_back_as_it_is(dtype):
+    """A rounded one to half an eps an entry, one that is off by 2 eps to 2 eps."""
+    random, eps = np.random.default_rng(2), np.finfo(dtype).eps
+    exact = np.asarray(reference.reference_rotation(random.standard_normal((4096, 3, 3))))
+    rounded = exact.astype(dtype)
+    assert np.abs(np.asarray(nearest(rounded)) - rounded).max() <= 0.5 * eps
+    noise = random.standard_normal(exact.shape)
+    noise *= 1.5 * eps / np.linalg.norm(noise, axis=(1, 2), keepdims=True)
+    noisy = (exact + noise).astype(dtype)
+    assert np.abs(np.asarray(nearest(noisy)) - noisy).max() <= 2 * eps
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("run", [singular_pair.solve, jax.jit(singular_pair.solve)], ids=["operations", "program"])
+def test_simple_matrices_have_exact_rotations(run, dtype):
+    def solved(matrix):
+        return np.asarray(run(np.asarray(matrix, dtype)))
+
+    for scale in (0, 1, 3, 0.1, 1e-30, np.pi):
+        np.testing.assert_array_equal(solved(scale * np.eye(3)), np.eye(3))
+    for diagonal in ((1, 1, 0), (2, 0, 0), (0, 3, 0), (1, 0, 1), (3, 2, 1), (1, 5, 5)):
+        np.testing.assert_array_equal(solved(np.diag(diagonal)), np.eye(3))
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            permutation = np.eye(3)[list(order)] * signs
+            if np.linalg.det(permutation) > 0:
+                np.testing.assert_array_equal(solved(permutation * 2.0**-7), permutation)
+
+
+def test_the_name_of_the_default_before_is_an_alias():
+    matrix = np.random.default_rng(3).standard_normal((3, 3))
+    with pytest.warns(DeprecationWarning, match="'half_turn' was replaced by 'singular_pair'"):
+        np.testing.assert_array_equal(nearest_rotation(matrix, method="half_turn"), nearest_rotation(matrix))
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])

@@ -47,6 +47,16 @@ NO_ROTATION = (*NO_ROTATION, "taylor_iterated", "simple_average")
 on_every_machine = pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES.keys())
 
 
+@pytest.fixture(params=["cpu", "gpu"])
+def form(request, monkeypatch):
+    """The program as it is written for a CPU, cut by quotients, and for an accelerator."""
+    monkeypatch.setattr(jax, "default_backend", lambda: request.param)
+    jax.clear_caches()
+    yield
+    jax.clear_caches()
+
+
+@pytest.mark.usefixtures("form")
 @on_every_machine
 def test_the_default_method_keeps_its_contract(machine):
     (rotation,) = evaluate(nearest_rotation, [BATCH.matrices], machine)
@@ -85,6 +95,7 @@ def test_a_step_leaves_a_rotation_and_stands_still_at_the_nearest(step, machine)
     assert_forward_error(rotation, BATCH, BATCH.condition < 100)
 
 
+@pytest.mark.usefixtures("form")
 @on_every_machine
 def test_the_jacobian_and_the_pullback_are_right(machine):
     where = resolved(BATCH, 1 / (128 * EPS)) & (np.abs(np.log2(SIZE[:, 0, 0])) < 100)
@@ -128,6 +139,21 @@ def test_the_gap_is_right(machine):
     where = NORMAL & (BATCH.singular_values[:, 0] > 0)
     error = np.abs(gap[where] - 1 / BATCH.condition[where])
     assert_within(error, 32 * EPS, BATCH.families[where], "gap")
+
+
+@pytest.mark.parametrize("transform", [jax.jit, jax.vmap, lambda f: jax.jit(jax.vmap(f))], ids=["jit", "vmap", "both"])
+def test_the_form_for_accelerators_runs_under_transformations(transform, monkeypatch):
+    matrices = BATCH.matrices[(BATCH.condition < 2) & (np.abs(SIZE[:, 0, 0] - 1) < 0.5)]
+    unrolled = functools.partial(refine_rotation, rotation=np.eye(3, dtype=np.float32), derivative="unrolled")
+    functions = [nearest_rotation, *(jax.vmap(mode(nearest_rotation)) for mode in (jax.jacfwd, jax.jacrev))]
+    functions.append(jax.vmap(jax.jacrev(unrolled)))
+    expected = [np.asarray(function(matrices)) for function in functions]
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    jax.clear_caches()
+    for function, value in zip(functions, expected, strict=True):
+        got = transform(function)(matrices) if function is nearest_rotation else jax.jit(function)(matrices)
+        np.testing.assert_allclose(got, value, rtol=1e-4, atol=1e-4)
+    jax.clear_caches()
 
 
 def test_the_interpreter_agrees_with_xla_but_for_rounding():

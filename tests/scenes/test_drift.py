@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxrot import DEFAULT_METHOD
 from jaxrot.scenes import cycles, drift
 from jaxrot.scenes.free_top import tumbling_rates
 from jaxrot.scenes.scene import flops
@@ -70,6 +71,13 @@ def test_taylor_keeps_orthonormality_and_the_random_walk_of_rounding(bodies, eve
     orientation, orthonormality = _errors(bodies, "taylor", every)
     assert np.all(orientation < 0.5 * EPS * STEPS**0.5)
     assert orthonormality < 3 * EPS
+
+
+def test_the_default_drifts_no_further_than_taylor(bodies):
+    """Both after every product, up to chance: its rounding has no mean that a steady turn would add up."""
+    orientation, orthonormality = _errors(bodies, DEFAULT_METHOD)
+    assert (orientation <= 1.5 * _errors(bodies, "taylor")[0]).all()
+    assert orthonormality < 1e-6
 
 
 def test_gram_schmidt_drifts_from_a_steady_body_in_proportion_to_the_steps(bodies):
