@@ -54,11 +54,17 @@ def computing(array: jax.Array) -> Computing:
     """Converts a checked array: half precision to float32, integers and booleans to the default floating dtype.
 
     Half precision has three digits, too few for a determinant.
+
+    Raises:
+        TypeError: float64 on a TPU, whose compiler does not read the exponents of such numbers.
     """
     dtype = array.dtype
     if not jnp.issubdtype(dtype, jnp.floating):
         dtype = jnp.result_type(float)
-    return Computing(array.astype(_computing_dtype(array.dtype, "")), dtype)
+    computing_dtype = _computing_dtype(array.dtype, "")
+    if computing_dtype == jnp.float64.dtype and jax.default_backend() == "tpu":
+        raise TypeError("matrix must be float32 or shorter on a TPU, which cannot scale float64; use .astype(float32)")
+    return Computing(array.astype(computing_dtype), dtype)
 
 
 def _as_array(argument: ArrayLike, name: str, expected: str) -> Array:

@@ -34,7 +34,7 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
 
     Raises:
         ValueError: Wrong shape, unknown method, negative damping.
-        TypeError: Complex or non-numeric matrix, traced method or damping.
+        TypeError: Complex or non-numeric matrix, traced method or damping, float64 on a TPU.
 
     Uniqueness:
         R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|: rank 2 and inverted matrices are fine.
@@ -69,7 +69,7 @@ def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, 
 
     Raises:
         ValueError: Wrong shape, unknown method, negative damping.
-        TypeError: Complex or non-numeric matrix, traced method or damping.
+        TypeError: Complex or non-numeric matrix, traced method or damping, float64 on a TPU.
 
     Uniqueness:
         q and −q are one rotation; w ≥ 0 chooses. At a half turn, w = 0, the sign is the one that makes the largest

@@ -33,6 +33,12 @@ def test_a_wrong_shape_is_refused_at_trace_time(function, shape):
         jax.jit(function)(np.ones(shape))
 
 
+def test_float64_on_a_tpu_is_refused_in_one_sentence(monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: "tpu")
+    with pytest.raises(TypeError, match="float32 or shorter on a TPU"):
+        nearest_rotation(np.ones((3, 3, 3, 3, 3)))
+
+
 def test_trailing_batch_axes_get_the_recipe():
     with pytest.raises(ValueError, match="in_axes=-1, out_axes=-1"):
         nearest_rotation(np.ones((3, 3, 5)))
