@@ -98,12 +98,13 @@ def outer_eigenvalue(gram: Deviator) -> jax.Array:
     (xx, yy, zz), (yz, xz, xy), p, _ = gram
     square = p * p
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    r = determinant / (2 * square * p + float(jnp.finfo(p.dtype).tiny))
+    p = p + p
+    r = determinant / (square * p + float(jnp.finfo(p.dtype).tiny))
     size = jnp.abs(r)
     *lower, t = _COSINE[r.dtype.name]
     for coefficient in reversed(lower):
         t = t * size + coefficient
-    p, square = p + p, 4 * (t * t)
+    square = 4 * (t * t)
     return jnp.where(r < 0, -p, p) * ((square + square) * t + size) / (3 * square - 3)
 
 
