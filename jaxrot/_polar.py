@@ -4,10 +4,10 @@ import functools
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from jaxrot import _mat3
-from jaxrot._choice import computed_once
 from jaxrot._compiled import compiled, exportable
 from jaxrot._derivative import stretch_tangent
 from jaxrot._inputs import check_choice, check_matrix
@@ -73,9 +73,10 @@ def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
     """S = RᵀA, a function of A alone: R's tangent is part of the rule. `order`: see `stretch_tangent`."""
     m = _mat3.components(matrix)
     # Scaled, a sum of three products does not overflow where S does not.
-    product = _mat3.transpose_multiply(_mat3.components(rotation), scaled(m))
-    # Once, or XLA:CPU rounds an entry and its mirror image differently.
-    return _mat3.stack(unscaled(computed_once(_mat3.symmetric(product)), m))
+    product = _mat3.stack(_mat3.transpose_multiply(_mat3.components(rotation), scaled(m)))
+    # Of the whole array, so that an entry and its mirror image are the sum of the same two numbers.
+    symmetric = 0.5 * (product + jnp.swapaxes(product, -1, -2))
+    return _mat3.stack(unscaled(_mat3.components(symmetric), m))
 
 
 @_stretch.defjvp

@@ -79,8 +79,8 @@ class _Interpreter:
 
     def _scan(self, values: list[np.ndarray], parameters: dict) -> list[np.ndarray]:
         """A loop of fixed length that carries everything, as `fori_loop` makes."""
-        constants, carry = values[: parameters["num_consts"]], values[parameters["num_consts"] :]
-        assert len(carry) == parameters["num_carry"], "a scan over arrays"
+        count = len(values) - len(parameters["jaxpr"].jaxpr.outvars)
+        constants, carry = values[:count], values[count:]
         for _ in range(parameters["length"]):
             carry = self.run(parameters["jaxpr"], [*constants, *carry])
         return carry
