@@ -14,6 +14,7 @@ from jax.sharding import PartitionSpec as P
 
 from jaxrot._compiled import ByIdentity
 from jaxrot._inputs import check_integer
+from jaxrot._platform import platform
 
 _P = ParamSpec("_P")
 _Result = TypeVar("_Result")
@@ -90,7 +91,7 @@ def _apply(function: Callable, args: tuple, size: int) -> Any:
 def _in_sequence(function: Callable, args: tuple, size: int) -> Any:
     """Calls the function for one block after the other."""
     count = jax.tree.leaves(args)[0].shape[0]
-    if not isinstance(count, int) or count <= size or jax.default_backend() != "cpu":
+    if not isinstance(count, int) or count <= size or platform() != "cpu":
         return function(*args)
     # Blocks that divide the batch save a copy of it, before and after.
     rows = next((n for n in range(size, size // 2, -1) if count % n == 0), size)

@@ -11,17 +11,21 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from jaxrot._platform import platform
+
 _Tree = TypeVar("_Tree")
 
 
 def computed_once(values: _Tree, divisor: jax.Array | None = None) -> _Tree:
-    """The values, one array or several, over a divisor; on a CPU over a 1 that XLA does not see through when absent.
+    """The values, one array or several, over a divisor.
 
-    That saves time too where they are used more than once: XLA:CPU stores quotients and forms all else again. Other
-    backends compute a kernel's values once, and there one reciprocal serves them all.
+    XLA:CPU stores quotients and computes everything else again where it is used. Where there is no divisor, a CPU
+    divides by a 1 that XLA does not see through. Other platforms compute the values of a kernel once: there the values
+    without a divisor stay as they are, and one reciprocal serves all of them.
     """
-    if jax.default_backend() != "cpu":
-        return values if divisor is None else jax.tree.map(lambda value: value * (1 / divisor), values)
+    if platform() != "cpu":
+        inverse = None if divisor is None else 1 / divisor
+        return values if inverse is None else jax.tree.map(lambda value: value * inverse, values)
     if divisor is None:
         divisor = constant_like(jax.tree.leaves(values)[0], 1)
     return jax.tree.map(lambda value: value / divisor, values)

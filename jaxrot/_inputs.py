@@ -10,6 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
+from jaxrot._platform import platform
+
 # A checked argument. NumPy arrays stay what they are until a compiled program takes them.
 Array = jax.Array | np.ndarray
 
@@ -56,14 +58,16 @@ def computing(array: jax.Array) -> Computing:
     Half precision has three digits, too few for a determinant.
 
     Raises:
-        TypeError: float64 on a TPU, whose compiler does not read the exponents of such numbers.
+        TypeError: float64 on a TPU. Its compiler cannot read the exponent of such numbers, which scaling needs.
     """
     dtype = array.dtype
     if not jnp.issubdtype(dtype, jnp.floating):
         dtype = jnp.result_type(float)
     computing_dtype = _computing_dtype(array.dtype, "")
-    if computing_dtype == jnp.float64.dtype and jax.default_backend() == "tpu":
-        raise TypeError("matrix must be float32 or shorter on a TPU, which cannot scale float64; use .astype(float32)")
+    if computing_dtype == jnp.float64.dtype and platform() == "tpu":
+        raise TypeError(
+            "matrix must be float32 or shorter on a TPU; for float64 use jax.default_device(jax.devices('cpu')[0])"
+        )
     return Computing(array.astype(computing_dtype), dtype)
 
 

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot._choice import constant_like
+from jaxrot._platform import platform
 
 # notation: a matrix is a tuple of rows, each a tuple of three arrays of one batch shape; a vector is such a row.
 Vec3 = tuple[jax.Array, jax.Array, jax.Array]
@@ -22,7 +23,8 @@ _Tree = TypeVar("_Tree", Vec3, Mat3)
 def components(matrix: jax.Array) -> Mat3:
     """Splits (..., 3, 3) into its nine entries.
 
-    By splits and not by indices: their transposes join where those of `matrix[..., i, j]` add nine padded arrays.
+    In reverse mode a split becomes one concatenation. Nine indices `matrix[..., i, j]` become nine padded arrays and
+    their sum.
     """
     x, y, z = (vector_components(lax.squeeze(row, [row.ndim - 2])) for row in lax.split(matrix, (1, 1, 1), -2))
     return x, y, z
@@ -37,9 +39,9 @@ def vector_components(vector: jax.Array) -> Vec3:
 def stack(m: Mat3) -> jax.Array:
     """Joins nine entries into (..., 3, 3).
 
-    On GPUs and TPUs behind a barrier, or the kernel that joins them evaluates what they come from once for each.
+    On GPUs and TPUs a barrier stands before. Without it the kernel that joins the entries computes them nine times.
     """
-    if jax.default_backend() != "cpu":
+    if platform() != "cpu":
         m = lax.optimization_barrier(m)
     return jnp.stack([jnp.stack(row, axis=-1) for row in m], axis=-2)
 
@@ -54,8 +56,8 @@ def add(a: Mat3, b: Mat3) -> Mat3:
     return (add_vectors(a[0], b[0]), add_vectors(a[1], b[1]), add_vectors(a[2], b[2]))
 
 
-def subtract(a: Mat3, b: Mat3) -> Mat3:
-    """The difference of two matrices."""
+def subtract(a: _Tree, b: _Tree) -> _Tree:
+    """The difference of two matrices or two vectors."""
     return jax.tree.map(lambda x, y: x - y, a, b)
 
 
@@ -139,7 +141,7 @@ def squared_norm(m: Mat3) -> jax.Array:
 
 
 def symmetric(m: Mat3) -> Mat3:
-    """The symmetric part (m + mᵀ)/2, symmetric bit for bit."""
+    """The symmetric part (m + mᵀ)/2."""
     xy, xz, yz = (m[0][1] + m[1][0]) * 0.5, (m[0][2] + m[2][0]) * 0.5, (m[1][2] + m[2][1]) * 0.5
     return ((m[0][0], xy, xz), (xy, m[1][1], yz), (xz, yz, m[2][2]))
 

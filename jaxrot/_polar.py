@@ -74,7 +74,7 @@ def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
     m = _mat3.components(matrix)
     # Scaled, a sum of three products does not overflow where S does not.
     product = _mat3.stack(_mat3.transpose_multiply(_mat3.components(rotation), scaled(m)))
-    # Of the whole array, so that an entry and its mirror image are the sum of the same two numbers.
+    # Of whole arrays: an entry and its mirror image then add the same two stored numbers, and S is exactly symmetric.
     symmetric = 0.5 * (product + jnp.swapaxes(product, -1, -2))
     return _mat3.stack(unscaled(_mat3.components(symmetric), m))
 

@@ -35,28 +35,28 @@ def scaled(m: _Tree) -> _Tree:
     """The entries of a matrix or quaternion times the power of two that brings the largest one into [2, 4).
 
     Where one is not finite all are NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
-    bit. The power is made of bits: on accelerators quotients are not exact, and the reciprocal of a number above 2¹²⁶
-    may be 0.
+    bit. The power is made of bits. A quotient would not do: accelerators round it, and flush the reciprocal of a number
+    above 2¹²⁶ to 0.
     """
     factor = power_of_two_factor(_size(m))
     return jax.tree.map(lambda entry: entry * factor, m)
 
 
 def unscaled(values: _Tree, m: object) -> _Tree:
-    """What belongs to the `scaled` entries of m, in the unit of m again."""
+    """Values in the unit of `scaled(m)`, in the unit of m again."""
     size = _size(m)
-    # Half of it first: the factor of the largest numbers has a reciprocal, that of the smallest has none.
+    # One over the factor is half of this power. Of the smallest matrices that is no normal number, but the power is.
     power = lax.bitcast_convert_type(_exponent(size)[0], size.dtype)
     return jax.tree.map(lambda value: (value * 0.5) * power, values)
 
 
 def _size(m: object) -> jax.Array:
-    # The same wherever it decides about a power of two, also where quotients are inexact.
+    # `scaled` and `unscaled` must see the same number, also where a quotient is inexact.
     return computed_once(_mat3.largest_entry(m))
 
 
 def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
-    """The bits of the exponent of a number ≥ 0, no less than that of the smallest normal one, and the mask of them."""
+    """The exponent bits of a number ≥ 0 and their mask. The exponent is at least that of the smallest normal number."""
     info = jnp.finfo(magnitude.dtype)
     mask = ((1 << int(info.nexp)) - 1) << int(info.nmant)
     normal = jnp.maximum(lax.stop_gradient(magnitude), float(info.tiny))
@@ -67,7 +67,7 @@ def unit_scaled(m: Mat3) -> Mat3:
     """The matrix with the Frobenius norm √3 of a rotation; a zero matrix stays zero."""
     m = scaled(m)
     norm = safe_sqrt(_mat3.squared_norm(m))
-    # Exactly 1 for a rotation: with another form `taylor` rounds every entry, and drifts twice as far.
+    # The factor is exactly 1 for a rotation. With another form `taylor` rounds every entry and drifts twice as far.
     return computed_once(_mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm)))
 
 

@@ -119,7 +119,7 @@ def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax
     m = _mat3.components(matrix)
     a = scaled(m)
     rotation = _mat3.components(METHODS[DEFAULT_METHOD].solve(matrix))
-    values, axes = eigen(_mat3.symmetric(_mat3.transpose_multiply(rotation, a)))
+    values, axes = eigen(computed_once(_mat3.symmetric(_mat3.transpose_multiply(rotation, a))))
     right = _mat3.newton_schulz(_mat3.transpose(axes))
     left = _mat3.newton_schulz(_mat3.multiply(rotation, right))
     # Rounding may have left the order broken: s2 by a few eps below |s3|, or negative.

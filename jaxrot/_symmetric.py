@@ -37,7 +37,8 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     symmetric: Mat3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     size = safe_sqrt(_mat3.squared_norm(symmetric) / 6)
     # notation: x, the eigenvalues of the deviation over its size, between −2 and 2: x³ − 3x − 2p = 0.
-    xx, xy, xz, yy, yz, zz = (safe_divide(entry, size) for entry in (xx, xy, xz, yy, yz, zz))
+    inverse = safe_divide(jnp.ones_like(size), size)
+    xx, xy, xz, yy, yz, zz = (entry * inverse for entry in (xx, xy, xz, yy, yz, zz))
     scaled: Mat3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     p = _mat3.determinant(scaled) * 0.5
     largest_is_simple = is_positive(p)

@@ -37,6 +37,8 @@ def test_float64_on_a_tpu_is_refused_in_one_sentence(monkeypatch):
     monkeypatch.setattr(jax, "default_backend", lambda: "tpu")
     with pytest.raises(TypeError, match="float32 or shorter on a TPU"):
         nearest_rotation(np.ones((3, 3, 3, 3, 3)))
+    with jax.default_device(jax.devices("cpu")[0]):
+        assert nearest_rotation(np.ones((3, 3, 3, 3, 3))).dtype == np.float64
 
 
 def test_trailing_batch_axes_get_the_recipe():

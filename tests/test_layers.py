@@ -15,6 +15,7 @@ LAYERS = [
         "_frozen",
         "_inputs",
         "_mat3",
+        "_platform",
         "_quaternion",
         "_scaling",
         "_startup",

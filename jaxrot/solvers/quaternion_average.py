@@ -34,7 +34,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     products = (_quaternion.dot((w, x, y, z), column) for column in columns)
     zero = constant_like(w, 0)
     weights = (jnp.where(product < 0, 2.0**i, zero) for i, product in enumerate(products))
-    # The half: a quotient is off by an ulp or two on accelerators, and the conversion truncates.
+    # The conversion truncates, and an inexact quotient may lie below the whole number.
     signs = (computed_once(functools.reduce(jnp.add, weights)) + 0.5).astype(jnp.int32)
     w, x, y, z = (_signed((signs >> i & 1) == 1, column) for i, column in enumerate(columns))
     # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.

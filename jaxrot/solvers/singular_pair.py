@@ -70,7 +70,7 @@ class Deviator(NamedTuple):
     Attributes:
         diagonal: xx, yy, zz.
         off_diagonal: yz, xz, xy.
-        p: The square root of half the variance of the eigenvalues, a sixth of the squared norm.
+        p: Its Frobenius norm over √6.
         xx: The first entry of AᵀA.
     """
 
@@ -92,8 +92,8 @@ def deviator(a: Mat3) -> Deviator:
 def outer_eigenvalue(gram: Deviator) -> jax.Array:
     """The largest or the smallest eigenvalue of the deviator, whichever is further from the middle one.
 
-    They are 2p cos(⅓ arccos r + 120° k) with p² = `variance` and r = det/2p³. The separated one has the sign of r, and
-    its cosine is the root t ≥ √¾ of 4t³ − 3t = |r|, which is simple.
+    The eigenvalues are 2p cos(⅓ arccos r + 120° k), with r = det/2p³. The separated one has the sign of r. Its cosine
+    t ≥ √¾ is a simple root of 4t³ − 3t = |r|: a polynomial gives it roughly, and a Newton step to rounding.
     """
     (xx, yy, zz), (yz, xz, xy), p, _ = gram
     square = p * p
@@ -149,17 +149,12 @@ def reflected(a: Mat3, x: jax.Array, y: jax.Array) -> Images:
     """The columns of A·(e, g, n), where 1 − 2 m mᵀ/‖m‖² of m = (x, y, 1) takes the axes to e, g and −n."""
     columns = _mat3.transpose(a)
     half = 0.5 * (x * x + y * y + 1)
-    one, two, three = a
-    am = (
-        one[0] * x + one[1] * y + one[2],
-        two[0] * x + two[1] * y + two[2],
-        three[0] * x + three[1] * y + three[2],
-    )
-    am = computed_once(am, half)
+    in_plane = _mat3.add_vectors(_mat3.scale_vector(columns[0], x), _mat3.scale_vector(columns[1], y))
+    am = computed_once(_mat3.add_vectors(in_plane, columns[2]), half)
     return Images(
-        _minus(columns[0], _mat3.scale_vector(am, x)),
-        _minus(columns[1], _mat3.scale_vector(am, y)),
-        _minus(am, columns[2]),
+        _mat3.subtract(columns[0], _mat3.scale_vector(am, x)),
+        _mat3.subtract(columns[1], _mat3.scale_vector(am, y)),
+        _mat3.subtract(am, columns[2]),
     )
 
 
@@ -176,8 +171,8 @@ def image_of_axis(images: Images, is_smallest: jax.Array, *, is_nearer: bool = T
 def half_angle(images: Images, axis: Vec3) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Cosine and sine of half the best angle about n, times one number, and tr(RᵀA).
 
-    The trace is u·An + c cos φ + d sin φ, at best u·An + √(c² + d²). Where all of c and d is rounding the angle is
-    arbitrary, but the same everywhere: c and d are computed_once.
+    The trace is u·An + c cos φ + d sin φ, at best u·An + √(c² + d²). Where A does not determine the angle, c and d are
+    rounding. They are computed once, so that every entry of R has the same angle.
     """
     x, y, s = axis
     e, g, n = images
@@ -238,7 +233,3 @@ def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kep
 def _guard(x: jax.Array) -> float:
     """Far below eps; its square is far above the smallest number."""
     return float(jnp.finfo(x.dtype).tiny) ** 0.4
-
-
-def _minus(u: Vec3, v: Vec3) -> Vec3:
-    return (u[0] - v[0], u[1] - v[1], u[2] - v[2])
