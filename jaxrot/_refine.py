@@ -12,7 +12,7 @@ from jaxrot._compiled import compiled
 from jaxrot._derivative import angular_tangent
 from jaxrot._inputs import check_choice, check_flag, check_iterations, check_matrix, check_start
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_sqrt, scaled
+from jaxrot._scaling import nonzero_sqrt, scaled
 from jaxrot.steps import STEPS
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
@@ -151,25 +151,29 @@ def _checked_options(step: str, iterations: int, escape: bool, derivative: str) 
 @compiled
 def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Options) -> jax.Array:
     start = scaled(_mat3.components(rotation))
-    # The shift is the scale c of the start c·Q: without it the columns are multiples of Q's quaternion at c = 1 only.
-    columns = _quaternion.davenport_columns(start, safe_sqrt(_mat3.squared_norm(start) / 3))
-    refined = _refine(matrix, _quaternion.largest_column(columns), options)
-    return _quaternion.to_matrix(_quaternion.components(refined))
+    # The shift is the scale c of the start c·Q, at least 2 after scaling. With another shift the columns are multiples
+    # of Q's quaternion at one scale only. A start of zeros has the shift 1 and becomes the identity.
+    columns = _quaternion.davenport_columns(start, nonzero_sqrt(_mat3.squared_norm(start) / 3, smallest=1.0))
+    # Neither the length of this quaternion nor its sign matters.
+    return _quaternion.to_matrix(_refine(matrix, _quaternion.largest_column(columns), options))
 
 
 @compiled
 def _refine_quaternion(matrix: jax.Array, quaternion_wxyz: jax.Array, *, options: _Options) -> jax.Array:
-    return _refine(matrix, scaled(_quaternion.components(quaternion_wxyz)), options)
+    start = _quaternion.normalise(scaled(_quaternion.components(quaternion_wxyz)))
+    return _quaternion.stack(_quaternion.renormalise(_refine(matrix, start, options)))
 
 
-def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> jax.Array:
+def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> Quaternion:
     step, iterations, escape, derivative = options
-    quaternion = _quaternion.stack(_quaternion.normalise(start))
+    quaternion = _quaternion.stack(start)
     batch = jnp.broadcast_shapes(matrix.shape[:-2], quaternion.shape[:-1])
     matrix, quaternion = jnp.broadcast_to(matrix, (*batch, 3, 3)), jnp.broadcast_to(quaternion, (*batch, 4))
     if derivative == "unrolled":
-        return _iterated(matrix, quaternion, step, iterations, escape)
-    return _refined(matrix, quaternion, step, iterations, escape, 0)
+        refined = _iterated(matrix, quaternion, step, iterations, escape)
+    else:
+        refined = _refined(matrix, quaternion, step, iterations, escape, 0)
+    return _quaternion.components(refined)
 
 
 def _iterated(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
@@ -180,7 +184,7 @@ def _iterated(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: i
     q = (w + zero, x + zero, y + zero, z + zero)
     if escape:
         q = leave_equilibrium(a, q)
-    return _quaternion.stack(_quaternion.renormalise(iterate(STEPS[step].correction, a, q, iterations)))
+    return _quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3
-from jaxrot._choice import computed_once
+from jaxrot._choice import computed_once, constant_like
 from jaxrot._mat3 import Mat3
 
 _Tree = TypeVar("_Tree")
@@ -72,15 +72,29 @@ def unit_scaled(m: Mat3) -> Mat3:
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
-    """The quotient, and 0 where the denominator is 0; the derivative is finite there too."""
+    """The quotient, and 0 where the denominator is 0; the derivative is finite there too.
+
+    The division comes last. XLA:CPU stores quotients, but computes a choice again in every fusion that uses it.
+    """
     is_zero = denominator == 0
     safe = jnp.where(is_zero, jnp.ones_like(denominator), denominator)
-    return jnp.where(is_zero, jnp.zeros_like(denominator), numerator / safe)
+    return jnp.where(is_zero, constant_like(denominator, 0), numerator) / safe
 
 
 def safe_sqrt(square: jax.Array) -> jax.Array:
     """√square, and 0 where it is zero or, by rounding, below; the derivative there is 0 instead of infinite."""
-    is_positive = square > 0
-    # A NaN is neither, so the outer choice must hand it on.
-    safe = jnp.where(square <= 0, jnp.ones_like(square), square)
-    return jnp.where(is_positive | jnp.isnan(square), jnp.sqrt(safe), jnp.zeros_like(square))
+    is_zero = square <= 0
+    root = jnp.sqrt(jnp.where(is_zero, jnp.ones_like(square), square))
+    return jnp.where(is_zero, jnp.zeros_like(root), root)
+
+
+def nonzero_sqrt(square: jax.Array, smallest: float | None = None) -> jax.Array:
+    """The square root of a number, or of `smallest` where the number is smaller.
+
+    It serves as a divisor: 0 over it is 0, with a finite derivative. `smallest` is the smallest normal number unless it
+    is given.
+    """
+    smallest = jnp.finfo(square.dtype).tiny if smallest is None else smallest
+    bound = jnp.full_like(square, smallest)
+    # A maximum would not do: on a mesh with Explicit axes jax 0.10 cannot differentiate it.
+    return jnp.sqrt(jnp.where(square <= bound, bound, square))

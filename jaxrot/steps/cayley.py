@@ -7,7 +7,7 @@ from jaxrot import _mat3
 from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_sqrt
+from jaxrot._scaling import nonzero_sqrt, safe_sqrt
 from jaxrot.steps.damped import damped_solve
 
 
@@ -32,7 +32,7 @@ def correction(b: Mat3) -> Quaternion:
 def zhang_shift(b: Mat3) -> jax.Array:
     """√(t² + ‖d‖²) − t ≥ 0: half of ‖d‖²/t near the solution, so that the order stays cubic; large beyond 90°."""
     t, d = _mat3.trace(b), _mat3.axial(b)
-    return safe_sqrt(t * t + _mat3.dot(d, d)) - t
+    return nonzero_sqrt(t * t + _mat3.dot(d, d)) - t
 
 
 def cayley_map(b: Mat3, shift: jax.Array) -> Quaternion:

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 
+import jax.numpy as jnp
 from jax import lax
 
 from jaxrot import _mat3, _quaternion
+from jaxrot._choice import computed_once
 from jaxrot._mat3 import Mat3
 from jaxrot._quaternion import Quaternion
 
@@ -24,6 +26,7 @@ def iterate(correction: Callable[[Mat3], Quaternion], a: Mat3, q: Quaternion, it
 
     def advance(_, q: Quaternion) -> Quaternion:
         b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
-        return _quaternion.normalise(_quaternion.product(q, correction(b)))
+        q = _quaternion.product(q, correction(b))
+        return computed_once(q, jnp.sqrt(_quaternion.squared_norm(q)))
 
     return lax.fori_loop(0, iterations, advance, q)

@@ -59,7 +59,7 @@ def one_step(step: str, without: tuple[str, ...] = ()) -> Callable[[jax.Array, j
         if ESCAPE not in without:
             q = leave_equilibrium(a, q)
         if "renormalisation" not in without:
-            return _quaternion.stack(_quaternion.renormalise(iterate(correction, a, q, 1)))
+            return _quaternion.stack(iterate(correction, a, q, 1))
         b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
         return _quaternion.stack(_quaternion.product(q, correction(b)))
 
