@@ -3,13 +3,13 @@
 from jaxrot import _startup as _startup  # the first: it handles Ctrl-C while the rest is imported
 from jaxrot import families as families
 from jaxrot._blocks import in_blocks as in_blocks
-from jaxrot._conditioning import rotation_gap as rotation_gap
-from jaxrot._dense import TwistModes as TwistModes
-from jaxrot._dense import arap_hessian as arap_hessian
-from jaxrot._dense import rotation_jacobian as rotation_jacobian
-from jaxrot._dense import twist_modes as twist_modes
+from jaxrot._gap import rotation_gap as rotation_gap
 from jaxrot._isotropic import isotropic_energy as isotropic_energy
 from jaxrot._isotropic import isotropic_map as isotropic_map
+from jaxrot._jacobian import TwistModes as TwistModes
+from jaxrot._jacobian import arap_hessian as arap_hessian
+from jaxrot._jacobian import rotation_jacobian as rotation_jacobian
+from jaxrot._jacobian import twist_modes as twist_modes
 from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
 from jaxrot._polar import PolarDecomposition as PolarDecomposition

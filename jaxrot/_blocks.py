@@ -12,9 +12,9 @@ from jax import lax
 from jax.sharding import NamedSharding, reshard
 from jax.sharding import PartitionSpec as P
 
+from jaxrot._algebra.platform import platform
 from jaxrot._compiled import ByIdentity
 from jaxrot._inputs import check_integer
-from jaxrot._platform import platform
 
 _P = ParamSpec("_P")
 _Result = TypeVar("_Result")

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot._platform import platform
+from jaxrot._algebra.platform import platform
 
 # A checked argument. NumPy arrays stay what they are until a compiled program takes them.
 Array = jax.Array | np.ndarray

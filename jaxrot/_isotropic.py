@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3
 from jaxrot._compiled import ByIdentity, compiled
-from jaxrot._divided_differences import divided_differences
+from jaxrot._derivative.divided_differences import divided_differences
 from jaxrot._inputs import check_choice, check_function, check_matrix
-from jaxrot._mat3 import Mat3
 from jaxrot._svd import decomposed, tangent_in_axes
 
 # What `vectors` may be, and the matrix that it stands for.
@@ -160,10 +160,10 @@ def _energy_jvp(energy: _Function, order: int, primals, tangents):
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4))
 def _mapped(matrix: jax.Array, parameters: tuple, function: _Function, vectors: str, order: int) -> jax.Array:
     left, s, _, right = decomposed(matrix, order)
-    x, y, z = _mat3.vector_components(_batched(function, s, parameters))
+    x, y, z = mat3.vector_components(_batched(function, s, parameters))
     outer, inner = _axes(left, right, vectors)
-    scaled = [_mat3.multiply_entries(row, (x, y, z)) for row in outer]
-    return _mat3.stack(_mat3.multiply((scaled[0], scaled[1], scaled[2]), _mat3.transpose(inner)))
+    scaled = [mat3.multiply_entries(row, (x, y, z)) for row in outer]
+    return mat3.stack(mat3.multiply((scaled[0], scaled[1], scaled[2]), mat3.transpose(inner)))
 
 
 @_mapped.defjvp
@@ -181,17 +181,17 @@ def _mapped_jvp(function: _Function, vectors: str, order: int, primals, tangents
     b = ((m[1][2] - m[2][1]) * 0.5, (m[2][0] - m[0][2]) * 0.5, (m[0][1] - m[1][0]) * 0.5)
     at_parameters = lambda s: batched(s, *parameters)  # noqa: E731
     slopes = divided_differences(at_parameters, s, phi, is_even=vectors != "left_right")
-    a, b = _mat3.multiply_entries(a, slopes.over_differences), _mat3.multiply_entries(b, slopes.over_sums)
-    x, y, z = _mat3.vector_components(phi_dot)
+    a, b = mat3.multiply_entries(a, slopes.over_differences), mat3.multiply_entries(b, slopes.over_sums)
+    x, y, z = mat3.vector_components(phi_dot)
     if vectors == "left_right":
-        upper, lower = _mat3.add_vectors(a, b), _mat3.add_vectors(a, _mat3.scale_vector(b, -1.0))
+        upper, lower = mat3.add_vectors(a, b), mat3.add_vectors(a, mat3.scale_vector(b, -1.0))
     else:
-        upper = lower = _mat3.add_vectors(a, _mat3.scale_vector(b, 1.0 if vectors == "right" else -1.0))
+        upper = lower = mat3.add_vectors(a, mat3.scale_vector(b, 1.0 if vectors == "right" else -1.0))
     tangent = ((x, upper[2], lower[1]), (lower[2], y, upper[0]), (upper[1], lower[0], z))
     outer, inner = _axes(left, right, vectors)
-    return value, _mat3.stack(_mat3.multiply(outer, _mat3.multiply(tangent, _mat3.transpose(inner))))
+    return value, mat3.stack(mat3.multiply(outer, mat3.multiply(tangent, mat3.transpose(inner))))
 
 
 def _axes(left: jax.Array, right: jax.Array, vectors: str) -> tuple[Mat3, Mat3]:
     outer, inner = {"left_right": (left, right), "left": (left, left), "right": (right, right)}[vectors]
-    return _mat3.components(outer), _mat3.components(inner)
+    return mat3.components(outer), mat3.components(inner)

@@ -1,13 +1,16 @@
 """The nearest rotation of a matrix, from a cold start."""
 
 import functools
+from collections.abc import Callable
 
 import jax
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3, _quaternion
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.scaling import scaled
 from jaxrot._compiled import compiled
-from jaxrot._derivative import rotation_tangent
+from jaxrot._derivative.rule import rotation_tangent
 from jaxrot._inputs import check_choice, check_damping, check_matrix
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
@@ -92,13 +95,18 @@ def _nearest_rotation(matrix: jax.Array, *, method: str, damping: float) -> jax.
 @compiled
 def _nearest_quaternion(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
     rotation = nearest(matrix, method, damping, 0)
-    return _quaternion.stack(_quaternion.from_rotation(_mat3.components(rotation)))
+    return quaternion.stack(quaternion.from_rotation(mat3.components(rotation)))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1, 2, 3))
 def nearest(matrix: jax.Array, method: str, damping: float, order: int) -> jax.Array:
-    """The solver, without its own derivative; `order` counts the derivatives taken, see `_saturation.gain`."""
-    return METHODS[method].solve(matrix)
+    """The solver, without its own derivative; `order` counts the derivatives taken, see `overflow.saturate`."""
+    return solved(METHODS[method].solve, matrix)
+
+
+def solved(solve: Callable[[Mat3], Mat3], matrix: jax.Array) -> jax.Array:
+    """What a solver makes of matrices (..., 3, 3) of any scale."""
+    return mat3.stack(solve(scaled(mat3.components(matrix))))
 
 
 @nearest.defjvp

@@ -7,12 +7,12 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3
+from jaxrot._algebra import mat3
+from jaxrot._algebra.scaling import scaled, unscaled
 from jaxrot._compiled import compiled, exportable
-from jaxrot._derivative import stretch_tangent
+from jaxrot._derivative.rule import stretch_tangent
 from jaxrot._inputs import check_choice, check_matrix
 from jaxrot._nearest import nearest
-from jaxrot._scaling import scaled, unscaled
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
@@ -71,16 +71,16 @@ def _polar_decomposition(matrix: jax.Array, *, method: str) -> PolarDecompositio
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
 def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
     """S = RᵀA, a function of A alone: R's tangent is part of the rule. `order`: see `stretch_tangent`."""
-    m = _mat3.components(matrix)
+    m = mat3.components(matrix)
     # Scaled, a sum of three products does not overflow where S does not.
-    product = _mat3.stack(_mat3.transpose_multiply(_mat3.components(rotation), scaled(m)))
+    product = mat3.stack(mat3.transpose_multiply(mat3.components(rotation), scaled(m)))
     # Of whole arrays: an entry and its mirror image then add the same two stored numbers, and S is exactly symmetric.
     symmetric = 0.5 * (product + jnp.swapaxes(product, -1, -2))
-    return _mat3.stack(unscaled(_mat3.components(symmetric), m))
+    return mat3.stack(unscaled(mat3.components(symmetric), m))
 
 
 @_stretch.defjvp
 def _stretch_jvp(order: int, primals, tangents):
     (matrix, rotation), (matrix_dot, _) = primals, tangents
-    tangent = stretch_tangent(*map(_mat3.components, (matrix, rotation, matrix_dot)), order=order)
-    return _stretch(matrix, rotation, order + 1), _mat3.stack(tangent)
+    tangent = stretch_tangent(*map(mat3.components, (matrix, rotation, matrix_dot)), order=order)
+    return _stretch(matrix, rotation, order + 1), mat3.stack(tangent)

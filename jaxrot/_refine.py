@@ -7,12 +7,12 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3, _quaternion
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import nonzero_sqrt, scaled
 from jaxrot._compiled import compiled
-from jaxrot._derivative import angular_tangent
+from jaxrot._derivative.rule import angular_tangent
 from jaxrot._inputs import check_choice, check_flag, check_iterations, check_matrix, check_start
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import nonzero_sqrt, scaled
 from jaxrot.steps import STEPS
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
@@ -150,57 +150,55 @@ def _checked_options(step: str, iterations: int, escape: bool, derivative: str) 
 
 @compiled
 def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Options) -> jax.Array:
-    start = scaled(_mat3.components(rotation))
+    start = scaled(mat3.components(rotation))
     # The shift is the scale c of the start c·Q, at least 2 after scaling. With another shift the columns are multiples
     # of Q's quaternion at one scale only. A start of zeros has the shift 1 and becomes the identity.
-    columns = _quaternion.davenport_columns(start, nonzero_sqrt(_mat3.squared_norm(start) / 3, smallest=1.0))
+    columns = quaternion.davenport_columns(start, nonzero_sqrt(mat3.squared_norm(start) / 3, smallest=1.0))
     # Neither the length of this quaternion nor its sign matters.
-    return _quaternion.to_matrix(_refine(matrix, _quaternion.largest_column(columns), options))
+    return mat3.stack(quaternion.to_orthonormal(_refine(matrix, quaternion.largest_column(columns), options)))
 
 
 @compiled
 def _refine_quaternion(matrix: jax.Array, quaternion_wxyz: jax.Array, *, options: _Options) -> jax.Array:
-    start = _quaternion.normalise(scaled(_quaternion.components(quaternion_wxyz)))
-    return _quaternion.stack(_quaternion.renormalise(_refine(matrix, start, options)))
+    start = quaternion.normalise(scaled(quaternion.components(quaternion_wxyz)))
+    return quaternion.stack(quaternion.renormalise(_refine(matrix, start, options)))
 
 
 def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> Quaternion:
     step, iterations, escape, derivative = options
-    quaternion = _quaternion.stack(start)
-    batch = jnp.broadcast_shapes(matrix.shape[:-2], quaternion.shape[:-1])
-    matrix, quaternion = jnp.broadcast_to(matrix, (*batch, 3, 3)), jnp.broadcast_to(quaternion, (*batch, 4))
+    wxyz = quaternion.stack(start)
+    batch = jnp.broadcast_shapes(matrix.shape[:-2], wxyz.shape[:-1])
+    matrix, wxyz = jnp.broadcast_to(matrix, (*batch, 3, 3)), jnp.broadcast_to(wxyz, (*batch, 4))
     if derivative == "unrolled":
-        refined = _iterated(matrix, quaternion, step, iterations, escape)
+        refined = _iterated(matrix, wxyz, step, iterations, escape)
     else:
-        refined = _refined(matrix, quaternion, step, iterations, escape, 0)
-    return _quaternion.components(refined)
+        refined = _refined(matrix, wxyz, step, iterations, escape, 0)
+    return quaternion.components(refined)
 
 
-def _iterated(matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
-    a = scaled(_mat3.components(matrix))
+def _iterated(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
+    a = scaled(mat3.components(matrix))
     # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
     zero = a[0][0] * 0
-    w, x, y, z = _quaternion.components(quaternion)
+    w, x, y, z = quaternion.components(wxyz)
     q = (w + zero, x + zero, y + zero, z + zero)
     if escape:
         q = leave_equilibrium(a, q)
-    return _quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
+    return quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
-def _refined(
-    matrix: jax.Array, quaternion: jax.Array, step: str, iterations: int, escape: bool, order: int
-) -> jax.Array:
-    """The iteration, without its own derivative; `order` counts the derivatives taken, see `_saturation.gain`."""
-    return _iterated(matrix, quaternion, step, iterations, escape)
+def _refined(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, escape: bool, order: int) -> jax.Array:
+    """The iteration, without its own derivative; `order` counts the derivatives taken, see `overflow.saturate`."""
+    return _iterated(matrix, wxyz, step, iterations, escape)
 
 
 @_refined.defjvp
 def _refined_jvp(step: str, iterations: int, escape: bool, order: int, primals, tangents):
-    (matrix, quaternion), (matrix_dot, _) = primals, tangents
-    refined = _refined(matrix, quaternion, step, iterations, escape, order + 1)
-    q = _quaternion.components(refined)
-    rotation = _quaternion.to_rotation(q)
-    x, y, z = angular_tangent(_mat3.components(matrix), rotation, _mat3.components(matrix_dot), order=order)
+    (matrix, wxyz), (matrix_dot, _) = primals, tangents
+    refined = _refined(matrix, wxyz, step, iterations, escape, order + 1)
+    q = quaternion.components(refined)
+    rotation = quaternion.to_rotation(q)
+    x, y, z = angular_tangent(mat3.components(matrix), rotation, mat3.components(matrix_dot), order=order)
     zero = x - x
-    return refined, 0.5 * _quaternion.stack(_quaternion.product(q, (zero, x, y, z)))
+    return refined, 0.5 * quaternion.stack(quaternion.product(q, (zero, x, y, z)))

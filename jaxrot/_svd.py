@@ -7,16 +7,16 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once
+from jaxrot._algebra import mat3
+from jaxrot._algebra.complex import Complex, multiply, reciprocal, square, times
+from jaxrot._algebra.eigh import eigen
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import scaled, unscaled
 from jaxrot._compiled import compiled, exportable
-from jaxrot._complex import Complex, multiply, reciprocal, square, times
-from jaxrot._derivative import resolved_gap
+from jaxrot._derivative.overflow import apply_scaled, normalising_factor, saturate, split_scale
+from jaxrot._derivative.rule import resolved_gap
 from jaxrot._inputs import check_matrix
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._saturation import factor_of, gain, halves, scaled_response
-from jaxrot._scaling import scaled, unscaled
-from jaxrot._symmetric import eigen
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
@@ -67,7 +67,7 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
         `isotropic_map`. For the rotation or the stretch alone use `nearest_rotation` or `polar_decomposition`.
 
     Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
-    the eigenvectors of the stretch, by `_symmetric.eigen`.
+    the eigenvectors of the stretch, by `eigh.eigen`.
     """
     return _rotation_variant_svd(check_matrix(matrix))
 
@@ -112,20 +112,20 @@ def _signed_singular_values(matrix: jax.Array) -> jax.Array:
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
 def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """U, s, s of the normalised A, and V; `order` counts the derivatives taken, see `_saturation.gain`.
+    """U, s, s of the normalised A, and V; `order` counts the derivatives taken, see `overflow.saturate`.
 
     The normalised ones are what derivatives divide by. Their own derivative is saturated, that of s is not.
     """
-    m = _mat3.components(matrix)
+    m = mat3.components(matrix)
     a = scaled(m)
-    rotation = _mat3.components(METHODS[DEFAULT_METHOD].solve(matrix))
-    values, axes = eigen(computed_once(_mat3.symmetric(_mat3.transpose_multiply(rotation, a))))
-    right = _mat3.newton_schulz(_mat3.transpose(axes))
-    left = _mat3.newton_schulz(_mat3.multiply(rotation, right))
+    rotation = METHODS[DEFAULT_METHOD].solve(a)
+    values, axes = eigen(fusion_barrier(mat3.symmetric(mat3.transpose_multiply(rotation, a))))
+    right = mat3.newton_schulz(mat3.transpose(axes))
+    left = mat3.newton_schulz(mat3.multiply(rotation, right))
     # Rounding may have left the order broken: s2 by a few eps below |s3|, or negative.
     s2 = jnp.maximum(values[1], jnp.abs(values[2]))
-    s = computed_once((jnp.maximum(values[0], s2), s2, values[2]))
-    return _mat3.stack(left), jnp.stack(unscaled(s, m), axis=-1), jnp.stack(s, axis=-1), _mat3.stack(right)
+    s = fusion_barrier((jnp.maximum(values[0], s2), s2, values[2]))
+    return mat3.stack(left), jnp.stack(unscaled(s, m), axis=-1), jnp.stack(s, axis=-1), mat3.stack(right)
 
 
 @decomposed.defjvp
@@ -136,22 +136,22 @@ def _decomposed_jvp(order: int, primals, tangents):
     s_dot = jnp.stack((m[0][0], m[1][1], m[2][2]), axis=-1)
 
     # notation: U̇ = U [p+w]×/2, V̇ = V [p−w]×/2: w is the angular velocity of U Vᵀ, in the axes V.
-    factor = factor_of(_mat3.components(matrix))
+    factor = normalising_factor(mat3.components(matrix))
     gaps = reciprocal_gaps(s, normalised, factor, order + 1)
-    scale = gain(factor, gaps.norm, order)
+    scale = saturate(factor, gaps.norm, order)
     mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])
-    w = scaled_response(functools.partial(_mat3.multiply_entries, gaps.over_sums), _mat3.axial(m), scale)
-    p = scaled_response(functools.partial(_mat3.multiply_entries, gaps.over_differences), mirrored, scale)
-    left_dot = _turned(left, _mat3.scale_vector(_mat3.add_vectors(p, w), 0.5))
-    right_dot = _turned(right, _mat3.scale_vector(_mat3.add_vectors(p, _mat3.scale_vector(w, -1.0)), 0.5))
-    normalised_dot = s_dot * gain(factor, gaps.norm, order + 1)[..., None]
+    w = apply_scaled(functools.partial(mat3.multiply_entries, gaps.over_sums), mat3.axial(m), scale)
+    p = apply_scaled(functools.partial(mat3.multiply_entries, gaps.over_differences), mirrored, scale)
+    left_dot = _turned(left, mat3.scale_vector(mat3.add_vectors(p, w), 0.5))
+    right_dot = _turned(right, mat3.scale_vector(mat3.add_vectors(p, mat3.scale_vector(w, -1.0)), 0.5))
+    normalised_dot = s_dot * saturate(factor, gaps.norm, order + 1)[..., None]
     return (left, s, normalised, right), (left_dot, s_dot, normalised_dot, right_dot)
 
 
 def tangent_in_axes(left: jax.Array, matrix_dot: jax.Array, right: jax.Array) -> Mat3:
     """UᵀȦV on components; its diagonal is ṡ."""
-    product = _mat3.multiply(_mat3.components(matrix_dot), _mat3.components(right))
-    return _mat3.transpose_multiply(_mat3.components(left), product)
+    product = mat3.multiply(mat3.components(matrix_dot), mat3.components(right))
+    return mat3.transpose_multiply(mat3.components(left), product)
 
 
 class ReciprocalGaps(NamedTuple):
@@ -180,7 +180,7 @@ class ReciprocalGaps(NamedTuple):
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
 def reciprocal_gaps(s: jax.Array, normalised: jax.Array, factor: jax.Array, order: int) -> ReciprocalGaps:
-    """The reciprocals; `order` is that of their derivative, see `_saturation.gain`.
+    """The reciprocals; `order` is that of their derivative, see `overflow.saturate`.
 
     Args:
         s: The singular values, whose tangent is the one used.
@@ -200,7 +200,7 @@ def _reciprocal_gaps_jvp(order: int, primals, tangents):
     s, normalised, factor = primals
     s_dot, _, _ = tangents
     gaps = reciprocal_gaps(s, normalised, factor, order + 1)
-    before, after = halves(gain(factor, gaps.norm, order))
+    before, after = split_scale(saturate(factor, gaps.norm, order))
     sums_dot, differences_dot, total_dot = _sums_and_differences(s_dot * before[..., None])
     delta_dot = resolved_gap(jnp.ones_like(total_dot)) * total_dot
 
@@ -226,4 +226,4 @@ def _real_parts(numbers: tuple[Complex, ...]) -> Vec3:
 
 
 def _turned(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
-    return _mat3.stack(_mat3.multiply(_mat3.components(axes), _mat3.skew(angular_velocity)))
+    return mat3.stack(mat3.multiply(mat3.components(axes), mat3.skew(angular_velocity)))

@@ -23,13 +23,13 @@ class Mutant(NamedTuple):
 
 MUTANTS = {
     "sign of S": Mutant(
-        "_mat3.py",
+        "_algebra/mat3.py",
         "(b[0][1] + b[1][0]) * -0.5",
         "(b[0][1] + b[1][0]) * 0.5",
         ("test_derivative.py::test_check_grads_agrees",),
     ),
     "missing damping guard": Mutant(
-        "_derivative.py",
+        "_derivative/rule.py",
         "_RESOLVED = 64",
         "_RESOLVED = 0",
         ("test_derivative.py::test_the_jacobian_is_finite_and_bounded_on_every_family[float64-forward]",),
@@ -65,10 +65,10 @@ MUTANTS = {
         ("test_svd.py::test_the_derivatives_are_right_where_singular_values_differ[generic]",),
     ),
     "a Hessian that is not projected": Mutant(
-        "_dense.py",
+        "_jacobian.py",
         "(1 / _at_least_two(gap) for",
         "(1 / gap for",
-        ("test_dense.py::test_what_is_compressed_has_no_curvature_along_its_twists",),
+        ("test_jacobian.py::test_what_is_compressed_has_no_curvature_along_its_twists",),
     ),
     "unrolled that is not": Mutant(
         "_refine.py",
@@ -78,8 +78,8 @@ MUTANTS = {
     ),
     "torque without the absolute value": Mutant(
         "steps/torque.py",
-        "jnp.abs(_mat3.trace(b)) + epsilon",
-        "_mat3.trace(b) + epsilon",
+        "jnp.abs(mat3.trace(b)) + epsilon",
+        "mat3.trace(b) + epsilon",
         ("test_refine.py::test_the_torque_iteration_turns_the_right_way_beyond_a_right_angle",),
     ),
 }

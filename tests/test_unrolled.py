@@ -9,7 +9,8 @@ import pytest
 from certificate import family_batch
 from differences import POINTS, difference_jacobian, turned
 
-from jaxrot import STEPS, _mat3, _quaternion, nearest_rotation, refine_quaternion_wxyz, refine_rotation
+from jaxrot import STEPS, nearest_rotation, refine_quaternion_wxyz, refine_rotation
+from jaxrot._algebra import mat3, quaternion
 
 RANDOM = np.random.default_rng(0)
 
@@ -106,7 +107,7 @@ def test_the_unrolled_quaternion_has_the_derivative_of_the_rotation():
     matrix, start = np.diag([1.0, 0.9, 0.8]) + 0.1 * RANDOM.standard_normal((3, 3)), np.array([0.9, 0.1, -0.3, 0.2])
 
     def rotation(q):
-        return _mat3.stack(_quaternion.to_rotation(_quaternion.components(q)))
+        return mat3.stack(quaternion.to_rotation(quaternion.components(q)))
 
     def through_quaternion(a, q):
         return rotation(refine_quaternion_wxyz(a, q, derivative="unrolled"))

@@ -3,8 +3,8 @@
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _definite, _mat3
-from jaxrot._scaling import safe_divide
+from jaxrot._algebra import ldl, mat3
+from jaxrot._algebra.scaling import safe_divide
 
 # A cluster on a line has no inertia about it; the shift, relative to the trace, takes its place.
 _SHIFT = 8
@@ -38,15 +38,15 @@ def without_momentum(changes: jax.Array, arms: jax.Array, shares: jax.Array) -> 
 def cross(u: jax.Array, v: jax.Array) -> jax.Array:
     """The vector product u × v along the last axis."""
     (ux, uy, uz), (vx, vy, vz) = (jnp.moveaxis(x, -1, 0) for x in (u, v))
-    return jnp.stack(_mat3.cross((ux, uy, uz), (vx, vy, vz)), axis=-1)
+    return jnp.stack(mat3.cross((ux, uy, uz), (vx, vy, vz)), axis=-1)
 
 
 def _angular_velocity(second_moment: jax.Array, angular_momentum: jax.Array) -> jax.Array:
     """I⁻¹ L with the inertia I = tr(M)·1 − M of the second moment M = Σ w r rᵀ; 0 for points that coincide."""
-    m = _mat3.components(second_moment)
-    trace = _mat3.trace(m)
+    m = mat3.components(second_moment)
+    trace = mat3.trace(m)
     # Over its trace the inertia has no unit, and vanishes with it where all points coincide.
-    inertia = jax.tree.map(lambda entry: safe_divide(entry, trace), _mat3.gap_matrix(m))
+    inertia = jax.tree.map(lambda entry: safe_divide(entry, trace), mat3.gap_matrix(m))
     shift = jnp.full_like(trace, _SHIFT * float(jnp.finfo(trace.dtype).eps))
     x, y, z = (safe_divide(angular_momentum[..., i], trace) for i in range(3))
-    return jnp.stack(_definite.solve(_mat3.add_to_diagonal(inertia, shift), (x, y, z)), axis=-1)
+    return jnp.stack(ldl.solve(mat3.add_to_diagonal(inertia, shift), (x, y, z)), axis=-1)

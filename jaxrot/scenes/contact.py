@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 from jaxrot._compiled import exportable
-from jaxrot._scaling import safe_divide, safe_sqrt
 
 # Lower and upper corner, each of three numbers.
 Corners = Sequence[Sequence[float]] | np.ndarray

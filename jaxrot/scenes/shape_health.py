@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxrot import nearest_rotation, rotation_gap
-from jaxrot._scaling import safe_divide
+from jaxrot._algebra.scaling import safe_divide
 from jaxrot.scenes.balance import cross
 from jaxrot.scenes.shape_matching import Parameters, State, fit_clusters, turned_offsets
 

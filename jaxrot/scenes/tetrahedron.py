@@ -13,8 +13,8 @@ from jax import lax
 from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, rotation_gap
+from jaxrot._algebra.scaling import safe_sqrt
 from jaxrot._compiled import exportable
-from jaxrot._scaling import safe_sqrt
 from jaxrot.scenes.scene import LARGEST_COORDINATE, Scene
 
 SPIKE = -0.66  # det F where Fig. 4 has its spike

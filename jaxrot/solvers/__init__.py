@@ -3,8 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-import jax
-
+from jaxrot._algebra.mat3 import Mat3
 from jaxrot._frozen import FrozenMapping
 from jaxrot.solvers import (
     cayley,
@@ -33,7 +32,8 @@ class Method(NamedTuple):
     """A solver and its domain.
 
     Attributes:
-        solve: From (..., 3, 3) float32 or float64 to rotations of the same shape; carries no derivative rule.
+        solve: From a matrix on components, its largest entry scaled into [2, 4) by a power of two, to a rotation on
+            components. Scaling before and stacking after happen outside. It carries no derivative rule.
         exact: It computes the nearest rotation to rounding, not an approximation of it.
         handles_inversion: Right for det A < 0 too.
         condition_limit: By dtype, the largest κ = s1/(s2+s3), a power of two, up to which it keeps the numerical
@@ -43,7 +43,7 @@ class Method(NamedTuple):
         source: Where it is from.
     """
 
-    solve: Callable[[jax.Array], jax.Array]
+    solve: Callable[[Mat3], Mat3]
     exact: bool
     handles_inversion: bool
     condition_limit: Mapping[str, float]
@@ -60,135 +60,147 @@ DEFAULT_METHOD = "singular_pair"
 METHODS: Mapping[str, Method] = FrozenMapping(
     {
         "singular_pair": Method(
-            singular_pair.solve,
+            solve=singular_pair.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2.0**20, 2.0**49),
             source="Wahba's problem on a circle; Smith 1961",
         ),
         "svd": Method(
-            svd.solve, exact=True, handles_inversion=True, condition_limit=_limit(0, 0), source="LAPACK; Kabsch 1976"
+            solve=svd.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(0, 0),
+            source="LAPACK; Kabsch 1976",
         ),
         "davenport": Method(
-            davenport.solve,
+            solve=davenport.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(0, 0),
             source="Davenport's q-method; Horn 1987",
         ),
         "smith_franca": Method(
-            smith_franca.solve,
+            solve=smith_franca.solve,
             exact=True,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Sarabandi et al. 2020, eq. (16)",
         ),
         "quaternion_average": Method(
-            quaternion_average.solve,
+            solve=quaternion_average.solve,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Sarabandi et al. 2020, eq. (30)",
         ),
         "cayley": Method(
-            cayley.solve,
+            solve=cayley.solve,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Sarabandi et al. 2020, eq. (31)",
         ),
         "foam": Method(
-            foam.solve, exact=True, handles_inversion=True, condition_limit=_limit(0.5, 0.5), source="Markley 1993"
+            solve=foam.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(0.5, 0.5),
+            source="Markley 1993",
         ),
         "squaring": Method(
-            squaring.solve,
+            solve=squaring.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2.0**20, 2.0**49),
             source="Wu et al. 2018 (FA3R)",
         ),
         "irving": Method(
-            irving.solve,
+            solve=irving.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(0, 0),
             source="Irving et al. 2004; Müller et al. 2016, appendix C",
         ),
         "gram_schmidt": Method(
-            gram_schmidt.solve,
+            solve=gram_schmidt.solve,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Müller et al. 2016, section 2",
         ),
         "inverse_square_root": Method(
-            inverse_square_root.solve,
+            solve=inverse_square_root.solve,
             exact=True,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Wessner 1966; Sarabandi et al. 2020, eq. (2)",
         ),
         "higham_newton": Method(
-            higham_newton.solve,
+            solve=higham_newton.solve,
             exact=True,
             handles_inversion=False,
             condition_limit=_limit(0.5, 0.5),
             source="Higham 1986",
         ),
         "taylor": Method(
-            taylor.solve,
+            solve=taylor.solve,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Sarabandi et al. 2020, eq. (20)",
         ),
         "taylor_iterated": Method(
-            taylor.solve_iterated,
+            solve=taylor.solve_iterated,
             exact=True,
             handles_inversion=False,
             condition_limit=_limit(0.5, 0.5),
             source="Hasan 2009",
         ),
         "shepperd_markley": Method(
-            shepperd_markley.solve,
+            solve=shepperd_markley.solve,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Shepperd 1978; Markley 2008",
         ),
         "simple_average": Method(
-            quaternion_average.solve_simply,
+            solve=quaternion_average.solve_simply,
             exact=False,
             handles_inversion=False,
             condition_limit=_limit(0, 0),
             source="Sarabandi et al. 2020, eq. (29)",
         ),
         "horn_quartic": Method(
-            horn_quartic.solve, exact=True, handles_inversion=True, condition_limit=_limit(2, 2), source="Horn 1987"
+            solve=horn_quartic.solve,
+            exact=True,
+            handles_inversion=True,
+            condition_limit=_limit(2, 2),
+            source="Horn 1987",
         ),
         "higham_noferini": Method(
-            higham_noferini.solve,
+            solve=higham_noferini.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2, 2),
             source="Higham and Noferini 2016",
         ),
         "jacobi_svd": Method(
-            jacobi_svd.solve,
+            solve=jacobi_svd.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2.0**20, 2.0**49),
             source="Kogbetliantz 1955",
         ),
         "implicit_qr_svd": Method(
-            implicit_qr_svd.solve,
+            solve=implicit_qr_svd.solve,
             exact=True,
             handles_inversion=True,
             condition_limit=_limit(2.0**20, 2.0**49),
             source="Gast et al. 2016",
         ),
         "torque": Method(
-            torque.solve,
+            solve=torque.solve,
             exact=False,
             handles_inversion=True,
             condition_limit=_limit(0, 0),

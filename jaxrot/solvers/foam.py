@@ -4,23 +4,20 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3
-from jaxrot._scaling import safe_divide, unit_scaled
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.scaling import safe_divide, unit_scaled
 
 # Newton's method descends from the upper bound; at the double root, s2+s3 → 0, it only halves its distance, and the
 # counts are where rounding stops it.
 _NEWTON_STEPS = {"float32": 14, "float64": 28}
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation R = [(f²+I)A − 2A AᵀA + 2f cof A] / [f(f²−I) − 2J].
 
     f = s1+s2+s3 is the largest root of (f²−I)² − 8Jf − 4‖cof A‖² = 0, with I = ‖A‖² and J = det A. No inverse, right
     for det A ≤ 0. The denominator is 2(s1+s2)(s2+s3)(s3+s1): where R is not unique the result is 0/0, returned as such.
-
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
 
     Returns:
         (..., 3, 3). In float32 good to κ ≈ 10: the root loses digits as it becomes double.
@@ -30,20 +27,20 @@ def solve(matrix: jax.Array) -> jax.Array:
     as Cauchy–Green invariants, Lin et al. 2022.
     """
     # notation: f, I (`square`) and J (`determinant`) as above.
-    a = unit_scaled(_mat3.components(matrix))
-    cofactor = _mat3.cofactor(a)
-    square = _mat3.squared_norm(a)
-    determinant = _mat3.dot(a[0], cofactor[0])
+    a = unit_scaled(a)
+    cofactor = mat3.cofactor(a)
+    square = mat3.squared_norm(a)
+    determinant = mat3.dot(a[0], cofactor[0])
     f = largest_root(cofactor, square, determinant)
-    gram = _mat3.transpose_multiply(a, a)
-    numerator = _mat3.add(_mat3.scale(a, f * f + square), _mat3.scale(_mat3.multiply(a, gram), -2.0))
-    numerator = _mat3.add(numerator, _mat3.scale(cofactor, 2 * f))
-    return _mat3.stack(_mat3.scale(numerator, 1 / (f * (f * f - square) - 2 * determinant)))
+    gram = mat3.transpose_multiply(a, a)
+    numerator = mat3.add(mat3.scale(a, f * f + square), mat3.scale(mat3.multiply(a, gram), -2.0))
+    numerator = mat3.add(numerator, mat3.scale(cofactor, 2 * f))
+    return mat3.scale(numerator, 1 / (f * (f * f - square) - 2 * determinant))
 
 
 def largest_root(cofactor: Mat3, square: jax.Array, determinant: jax.Array) -> jax.Array:
     """The sum s1+s2+s3 by Newton's method from the upper bound √(3I), from which it descends monotonically."""
-    constant = 4 * _mat3.squared_norm(cofactor)
+    constant = 4 * mat3.squared_norm(cofactor)
 
     def newton(_, f: jax.Array) -> jax.Array:
         excess = f * f - square

@@ -1,25 +1,20 @@
 """Higham's Newton iteration for the polar decomposition."""
 
-import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3
-from jaxrot._scaling import scaled
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3
 
 # With 6 nothing was left to gain on 3e5 matrices of any s1/s3.
 _ITERATIONS = {"float32": 7, "float64": 8}
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation of a matrix with det A > 0, by R ← ½ (γ R + R⁻ᵀ/γ) from R = A.
 
     Every singular value x becomes ½ (γ x + 1/(γ x)), which doubles its correct digits; γ = (‖R⁻¹‖/‖R‖)^½ makes their
     spread small first. For det A < 0 the limit is the nearest *reflection*, for det A = 0 NaN.
-
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
 
     Returns:
         (..., 3, 3), to rounding while s2 s3 > eps s1², whatever κ. Beyond that the determinant is rounding, and with it
@@ -28,14 +23,13 @@ def solve(matrix: jax.Array) -> jax.Array:
     Cost: 95 flops, two square roots and three divisions a step.
     Source: Higham 1986; Müller et al. 2016, section 2, which prints it without the scaling.
     """
-    a = scaled(_mat3.components(matrix))
-    return _mat3.stack(lax.fori_loop(0, _ITERATIONS[matrix.dtype.name], lambda _, r: newton(r), a))
+    return lax.fori_loop(0, _ITERATIONS[a[0][0].dtype.name], lambda _, r: newton(r), a)
 
 
 def newton(r: Mat3) -> Mat3:
     """One step."""
-    cofactor = _mat3.cofactor(r)
-    determinant = _mat3.dot(r[0], cofactor[0])
-    ratio = _mat3.squared_norm(cofactor) / _mat3.squared_norm(r)  # (‖R⁻¹‖ det R / ‖R‖)²
+    cofactor = mat3.cofactor(r)
+    determinant = mat3.dot(r[0], cofactor[0])
+    ratio = mat3.squared_norm(cofactor) / mat3.squared_norm(r)  # (‖R⁻¹‖ det R / ‖R‖)²
     gamma = jnp.sqrt(jnp.sqrt(ratio) / jnp.abs(determinant))
-    return _mat3.add(_mat3.scale(r, 0.5 * gamma), _mat3.scale(cofactor, 0.5 / (gamma * determinant)))
+    return mat3.add(mat3.scale(r, 0.5 * gamma), mat3.scale(cofactor, 0.5 / (gamma * determinant)))

@@ -3,10 +3,11 @@
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._choice import constant_like
-from jaxrot._quaternion import Columns, Quaternion
-from jaxrot._scaling import safe_divide, unit_scaled
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Columns, Quaternion
+from jaxrot._algebra.scaling import safe_divide, unit_scaled
+from jaxrot._algebra.select import constant_like
 from jaxrot.solvers.foam import largest_root
 
 # One iteration multiplies what is wrong with the eigenvector by the error of the eigenvalue over its gap.
@@ -16,17 +17,14 @@ _INVERSE_ITERATIONS = 2
 _ORDER = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The rotation of the eigenvector of Davenport's N(A) for its largest eigenvalue f.
 
     f comes from Newton's method on the quartic; f·1 − N = P L D Lᵀ Pᵀ with diagonal pivoting; the start P L⁻ᵀ e₄ is
     already the eigenvector where f is exact, and inverse iteration makes up for an f that is not.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-
     Returns:
-        (..., 3, 3) rotations, for det A ≤ 0 too.
+        Rotations, for det A ≤ 0 too.
 
     Cost: about 550 flops with 14 Newton steps (float32), 720 with 28 (float64), and 30 or 44 divisions.
     Source: Higham and Noferini, "An algorithm to compute the polar decomposition of a 3×3 matrix", 2016: [27] of
@@ -34,11 +32,11 @@ def solve(matrix: jax.Array) -> jax.Array:
     two-dimensional subspace where it is not; without branches Newton and single vectors do for both. N itself is
     theirs, so that its dominant eigenvalue is the algebraically largest.
     """
-    a = unit_scaled(_mat3.components(matrix))
-    cofactor = _mat3.cofactor(a)
-    f = largest_root(cofactor, _mat3.squared_norm(a), _mat3.dot(a[0], cofactor[0]))
-    q = null_vector(_quaternion.davenport_columns(_mat3.scale(a, -1.0), f))
-    return _quaternion.to_matrix(q)
+    a = unit_scaled(a)
+    cofactor = mat3.cofactor(a)
+    f = largest_root(cofactor, mat3.squared_norm(a), mat3.dot(a[0], cofactor[0]))
+    q = null_vector(quaternion.davenport_columns(mat3.scale(a, -1.0), f))
+    return quaternion.to_orthonormal(q)
 
 
 def null_vector(columns: Columns) -> Quaternion:

@@ -2,32 +2,29 @@
 
 import jax
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._mat3 import Mat3
-from jaxrot._scaling import safe_divide, safe_sqrt, unit_scaled
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt, unit_scaled
 from jaxrot.solvers.smith_franca import smith_eigenvalues
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The rotation of the eigenvector of Davenport's N(A) for its largest eigenvalue f, all in closed form.
 
     The eigenvector is the largest column of adj(f·1 − N), of the Davenport matrix of f and A.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-
     Returns:
-        (..., 3, 3) rotations, for det A ≤ 0 too; the identity for A = 0. The root loses digits as it becomes double,
+        Rotations, for det A ≤ 0 too; the identity for A = 0. The root loses digits as it becomes double,
         s2+s3 → 0, and the adjugate where two gaps are small, near −R.
 
     Cost: about 430 flops, six square roots, an arc tangent, a sine and a cosine.
     Source: Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987: [25] of Sarabandi et al.
     2020, whose "dominant" eigenvalue, largest in modulus, must be the algebraically largest.
     """
-    a = unit_scaled(_mat3.components(matrix))
-    columns = _quaternion.davenport_columns(_mat3.scale(a, -1.0), quartic_root(a))
-    q = _quaternion.normalise(_quaternion.largest_column(_quaternion.adjugate(columns)))
-    return _quaternion.to_matrix(q)
+    a = unit_scaled(a)
+    columns = quaternion.davenport_columns(mat3.scale(a, -1.0), quartic_root(a))
+    q = quaternion.normalise(quaternion.largest_column(quaternion.adjugate(columns)))
+    return quaternion.to_orthonormal(q)
 
 
 def quartic_root(a: Mat3) -> jax.Array:
@@ -36,6 +33,6 @@ def quartic_root(a: Mat3) -> jax.Array:
     The z are the roots of its resolvent cubic, here the eigenvalues of AᵀA; the last term is J/√(z1 z2), which has the
     sign it must have and does not take the root of a number that rounding has made.
     """
-    z1, z2, _ = smith_eigenvalues(_mat3.transpose_multiply(a, a))
+    z1, z2, _ = smith_eigenvalues(mat3.transpose_multiply(a, a))
     s1, s2 = safe_sqrt(z1), safe_sqrt(z2)
-    return s1 + s2 + safe_divide(_mat3.determinant(a), s1 * s2)
+    return s1 + s2 + safe_divide(mat3.determinant(a), s1 * s2)

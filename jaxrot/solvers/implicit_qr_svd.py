@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _jacobi, _mat3
-from jaxrot._jacobi import givens, rotate, rotate_rows
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_divide, safe_sqrt, scaled
+from jaxrot._algebra import jacobi, mat3
+from jaxrot._algebra.jacobi import givens, rotate, rotate_rows
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 
 # One more than was needed for 8 eps (1+κ) on 4e4 matrices of all families; with two fewer 5 in 1e4 fail.
 _SWEEPS = {"float32": 6, "float64": 7}
@@ -24,22 +24,18 @@ class _Bidiagonal(NamedTuple):
     right: Mat3
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation U Vᵀ from A = U diag(s1, s2, s3) Vᵀ with rotations U and V.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-
     Returns:
-        (..., 3, 3) rotations, for det A ≤ 0 too: the sign is in s3 and never in U or V.
+        Rotations, for det A ≤ 0 too: the sign is in s3 and never in U or V.
 
     Cost: see `decompose`.
     Source: Sarabandi et al. 2020, section V, reference [33]; the determinant is repaired as in `jacobi_svd`.
     """
-    a = scaled(_mat3.components(matrix))
     left, _, right = decompose(a)
     # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
-    return _mat3.stack(_mat3.newton_schulz(_mat3.multiply(left, _mat3.transpose(right))))
+    return mat3.newton_schulz(mat3.multiply(left, mat3.transpose(right)))
 
 
 def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
@@ -61,23 +57,23 @@ def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     2016; Golub and Kahan 1965; the zero shift: Demmel and Kahan 1990.
     """
     # Beside this an entry is rounding.
-    negligible = float(jnp.finfo(a[0][0].dtype).eps) * safe_sqrt(_mat3.squared_norm(a))
+    negligible = float(jnp.finfo(a[0][0].dtype).eps) * safe_sqrt(mat3.squared_norm(a))
     state = lax.fori_loop(
         0, _SWEEPS[a[0][0].dtype.name], lambda _, state: _sweep(state, negligible), _bidiagonalised(a)
     )
     # The second time there is nothing left to do. It makes XLA keep the loop, and so the results, see `ordered_svd`.
     (a0, a1, a2), _, left, right = lax.fori_loop(0, 2, lambda _, state: _last_block(state), state)
-    return _jacobi.ordered_svd(left, (a0, a1, a2), right)
+    return jacobi.ordered_svd(left, (a0, a1, a2), right)
 
 
 def _bidiagonalised(a: Mat3) -> _Bidiagonal:
-    left = right = _mat3.identity_like(a)
+    left = right = mat3.identity_like(a)
     m = a
     for column, i, j in ((0, 1, 2), (0, 0, 1)):
         r = givens(m[i][column], m[j][column])
         m, left = rotate_rows(r, m, i, j), rotate_rows(r, left, i, j)
     r = givens(m[0][1], m[0][2])
-    m, right = _mat3.transpose(rotate_rows(r, _mat3.transpose(m), 1, 2)), rotate_rows(r, right, 1, 2)
+    m, right = mat3.transpose(rotate_rows(r, mat3.transpose(m), 1, 2)), rotate_rows(r, right, 1, 2)
     r = givens(m[1][1], m[2][1])
     m, left = rotate_rows(r, m, 1, 2), rotate_rows(r, left, 1, 2)
     return _Bidiagonal((m[0][0], m[1][1], m[2][2]), (m[0][1], m[1][2]), left, right)
@@ -123,8 +119,8 @@ def _last_block(state: _Bidiagonal) -> _Bidiagonal:
     is_last = jnp.abs(b0) < jnp.abs(b1)
     a0, a1, a2 = (jnp.where(is_last, x, y) for x, y in ((a1, a0), (a2, a1), (a0, a2)))
     b0 = jnp.where(is_last, b1, b0)
-    left, right = _jacobi.rolled(is_last, left), _jacobi.rolled(is_last, right)
-    by_rows, by_columns = _jacobi.svd_2x2(a0, b0, zero, a1)
+    left, right = jacobi.rolled(is_last, left), jacobi.rolled(is_last, right)
+    by_rows, by_columns = jacobi.svd_2x2(a0, b0, zero, a1)
     (a0, below), (b0, a1) = rotate(by_rows, a0, zero), rotate(by_rows, b0, a1)
     a0, a1 = rotate(by_columns, a0, b0)[0], rotate(by_columns, below, a1)[1]
     left, right = rotate_rows(by_rows, left, 0, 1), rotate_rows(by_columns, right, 0, 1)

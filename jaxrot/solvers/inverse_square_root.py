@@ -1,20 +1,16 @@
 """The closed form A (AᵀA)^(−1/2) through the eigenvectors of AᵀA."""
 
-import jax
 import jax.numpy as jnp
 
-from jaxrot import _jacobi, _mat3
-from jaxrot._scaling import scaled
+from jaxrot._algebra import jacobi, mat3
+from jaxrot._algebra.mat3 import Mat3
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation of a matrix with det A > 0 whose singular values are not far apart.
 
     (AᵀA)^(−1/2) = V diag(λ^(−1/2)) Vᵀ with Jacobi's eigenvectors V; `smith_franca` has the same product without them.
     For det A < 0 the formula gives the nearest *reflection*; for det A = 0 it divides by zero, NaN or infinity.
-
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
 
     Returns:
         (..., 3, 3). The error grows like eps (s1/s3)²: λ3 is good to eps s1², and divided by.
@@ -23,8 +19,7 @@ def solve(matrix: jax.Array) -> jax.Array:
     Source: Wessner 1966, in Müller et al. 2016, section 2; Sarabandi et al. 2020, eq. (2), (6) and (7), where V holds
     the columns of what is printed as Vᵀ.
     """
-    a = scaled(_mat3.components(matrix))
-    eigenvalues, axes = _jacobi.symmetric_eigen(_mat3.transpose_multiply(a, a))
-    weighted = [_mat3.scale_vector(axis, 1 / jnp.sqrt(x)) for axis, x in zip(axes, eigenvalues, strict=True)]
-    root = _mat3.transpose_multiply((weighted[0], weighted[1], weighted[2]), axes)
-    return _mat3.stack(_mat3.multiply(a, root))
+    eigenvalues, axes = jacobi.symmetric_eigen(mat3.transpose_multiply(a, a))
+    weighted = [mat3.scale_vector(axis, 1 / jnp.sqrt(x)) for axis, x in zip(axes, eigenvalues, strict=True)]
+    root = mat3.transpose_multiply((weighted[0], weighted[1], weighted[2]), axes)
+    return mat3.multiply(a, root)

@@ -1,33 +1,27 @@
 """The singular value decomposition by two-sided Jacobi rotations."""
 
-import jax
 from jax import lax
 
-from jaxrot import _jacobi, _mat3
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import scaled
+from jaxrot._algebra import jacobi, mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
 
 # One more than was needed for 8 eps (1+κ) on 4e4 matrices of all families; with two fewer 2 % of them fail.
 _SWEEPS = {"float32": 5, "float64": 6}
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation U Vᵀ from A = U diag(s1, s2, s3) Vᵀ with rotations U and V.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-
     Returns:
-        (..., 3, 3) rotations, for det A ≤ 0 too: the sign is in s3 and never in U or V.
+        Rotations, for det A ≤ 0 too: the sign is in s3 and never in U or V.
 
     Cost: see `decompose`.
     Source: Sarabandi et al. 2020, section V, reference [32] (the Jacobi SVD of Eigen); the repair of the determinant is
     not their (5), diag(1, 1, −1), which is right for sorted singular values and det A < 0 alone.
     """
-    a = scaled(_mat3.components(matrix))
     left, _, right = decompose(a)
     # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
-    return _mat3.stack(_mat3.newton_schulz(_mat3.multiply(left, _mat3.transpose(right))))
+    return mat3.newton_schulz(mat3.multiply(left, mat3.transpose(right)))
 
 
 def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
@@ -49,12 +43,12 @@ def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     def sweep(_, state: tuple[Mat3, Mat3, Mat3]) -> tuple[Mat3, Mat3, Mat3]:
         m, left, right = state
         for i, j in ((0, 1), (0, 2), (1, 2)):
-            by_rows, by_columns = _jacobi.svd_2x2(m[i][i], m[i][j], m[j][i], m[j][j])
-            m = _jacobi.rotate_rows(by_rows, m, i, j)
-            m = _mat3.transpose(_jacobi.rotate_rows(by_columns, _mat3.transpose(m), i, j))
-            left, right = _jacobi.rotate_rows(by_rows, left, i, j), _jacobi.rotate_rows(by_columns, right, i, j)
+            by_rows, by_columns = jacobi.svd_2x2(m[i][i], m[i][j], m[j][i], m[j][j])
+            m = jacobi.rotate_rows(by_rows, m, i, j)
+            m = mat3.transpose(jacobi.rotate_rows(by_columns, mat3.transpose(m), i, j))
+            left, right = jacobi.rotate_rows(by_rows, left, i, j), jacobi.rotate_rows(by_columns, right, i, j)
         return m, left, right
 
-    one = _mat3.identity_like(a)
+    one = mat3.identity_like(a)
     m, left, right = lax.fori_loop(0, _SWEEPS[a[0][0].dtype.name], sweep, (a, one, one))
-    return _jacobi.ordered_svd(left, (m[0][0], m[1][1], m[2][2]), right)
+    return jacobi.ordered_svd(left, (m[0][0], m[1][1], m[2][2]), right)

@@ -5,14 +5,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._choice import computed_once, constant_like, sign_of
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import scaled
-
-# The stages that keep a promise each and that `solve` can leave out, to see what they cost.
-GUARDS = ("scale", "largest column", "nearer reflection", "rotations as they are", "renormalisation")
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.select import constant_like, sign_of
 
 # cos(⅓ arccos r) on [0, 1] to 4e-5 and 2e-9, by Chebyshev interpolation. A Newton step follows.
 _COSINE = {
@@ -22,46 +19,36 @@ _COSINE = {
 }  # fmt: skip
 
 
-def solve(matrix: jax.Array, *, without: tuple[str, ...] = ()) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation, to rounding, without a branch, an iteration or a decomposition.
 
     R maps each right singular vector to its left one. One pair is enough: only the angle about it is then missing.
 
     1. n, the singular vector whose eigenvalue of AᵀA is separated: the largest or the smallest, whichever is further
-       from the middle one. It is a column of an adjugate. *largest column*: the one that cannot vanish.
+       from the middle one. It is a column of an adjugate: the one that cannot vanish.
     2. u = R n: A n where n belongs to the largest singular value, else cof(A) n. The sign of det A takes no part.
-    3. Two reflections, of n and of u onto the third axis. *nearer reflection*: that of u to its own side.
+    3. Two reflections, of n and of u onto the third axis, that of u to its own side.
     4. The angle about n that makes tr(RᵀA) largest, and R's quaternion from the two reflections and the angle.
-    5. *rotations as they are*: where A is a rotation to √eps times a power of two, A itself goes on, so that repeated
-       repairs do not drift.
-    6. *renormalisation*: one Newton–Schulz step.
+    5. Where A is a rotation to √eps times a power of two, A itself goes on, so that repeated repairs do not drift.
+    6. One Newton–Schulz step.
 
     Rounding of AᵀA, eps s1², tilts v1 towards vⱼ by eps s1²/(s1² − sⱼ²), and R by that times (s1 − sⱼ)/s1, which is
     eps s1/(s1 + sⱼ) ≤ eps κ. The same holds for v3 where it is the separated one, with a factor of √2.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-        without: Names in `GUARDS` of stages to leave out, static; what remains has a smaller domain.
-
     Returns:
-        (..., 3, 3) rotations that keep every line of the contract; NaN where the matrix is not finite.
+        Rotations that keep every line of the contract; NaN where the matrix is not finite.
 
     Cost: about 450 flops, 28 divisions and 4 square roots included.
     Source: Wahba's problem on the circle of rotations that map n to u; Smith 1961 for the eigenvalue.
     """
-    a = _mat3.components(matrix)
-    if "scale" not in without:
-        a = scaled(a)
     gram = deviator(a)
     outer = outer_eigenvalue(gram)
-    x, y = eigenvector(gram, outer, is_chosen="largest column" not in without)
+    x, y = eigenvector(gram, outer)
     images = reflected(a, x, y)
-    axis = image_of_axis(images, outer < 0, is_nearer="nearer reflection" not in without)
+    axis = image_of_axis(images, outer < 0)
     cosine, sine, trace = half_angle(images, axis)
-    r = rotation(a, quaternion((x, y), axis, cosine, sine), gram, trace, is_kept="rotations as they are" not in without)
-    if "renormalisation" not in without:
-        r = _mat3.newton_schulz(r)
-    return _mat3.stack(r)
+    r = rotation(a, composed((x, y), axis, cosine, sine), gram, trace)
+    return mat3.newton_schulz(r)
 
 
 class Deviator(NamedTuple):
@@ -82,10 +69,10 @@ class Deviator(NamedTuple):
 
 def deviator(a: Mat3) -> Deviator:
     """AᵀA without its mean."""
-    (xx, yy, zz), off_diagonal = _mat3.gram(a)
+    (xx, yy, zz), off_diagonal = mat3.gram(a)
     mean = (xx + yy + zz) * (1 / 3)
     diagonal = xx - mean, yy - mean, zz - mean
-    square = 0.5 * _mat3.dot(diagonal, diagonal) + _mat3.dot(off_diagonal, off_diagonal)
+    square = 0.5 * mat3.dot(diagonal, diagonal) + mat3.dot(off_diagonal, off_diagonal)
     return Deviator(diagonal, off_diagonal, jnp.sqrt(square * (1 / 3)), xx)
 
 
@@ -130,10 +117,10 @@ def eigenvector(gram: Deviator, eigenvalue: jax.Array, *, is_chosen: bool = True
         is_third, is_first = jnp.maximum(first[0], second[1]) < z, first[0] >= second[1]
         third_chosen = is_third.astype(x.dtype)
         index = third_chosen + third_chosen - is_first.astype(x.dtype)
-        index = computed_once(index, 1 + gram.p)
-        x, y, z = _mat3.where(index > 0, third, _mat3.where(index < 0, first, second))
+        index = fusion_barrier(index, 1 + gram.p)
+        x, y, z = mat3.where(index > 0, third, mat3.where(index < 0, first, second))
     length = z + jnp.sqrt(x * x + y * y + z * z)
-    x, y = computed_once((x, y), length)
+    x, y = fusion_barrier((x, y), length)
     return x, y
 
 
@@ -147,23 +134,23 @@ class Images(NamedTuple):
 
 def reflected(a: Mat3, x: jax.Array, y: jax.Array) -> Images:
     """The columns of A·(e, g, n), where 1 − 2 m mᵀ/‖m‖² of m = (x, y, 1) takes the axes to e, g and −n."""
-    columns = _mat3.transpose(a)
+    columns = mat3.transpose(a)
     half = 0.5 * (x * x + y * y + 1)
-    in_plane = _mat3.add_vectors(_mat3.scale_vector(columns[0], x), _mat3.scale_vector(columns[1], y))
-    am = computed_once(_mat3.add_vectors(in_plane, columns[2]), half)
+    in_plane = mat3.add_vectors(mat3.scale_vector(columns[0], x), mat3.scale_vector(columns[1], y))
+    am = fusion_barrier(mat3.add_vectors(in_plane, columns[2]), half)
     return Images(
-        _mat3.subtract(columns[0], _mat3.scale_vector(am, x)),
-        _mat3.subtract(columns[1], _mat3.scale_vector(am, y)),
-        _mat3.subtract(am, columns[2]),
+        mat3.subtract(columns[0], mat3.scale_vector(am, x)),
+        mat3.subtract(columns[1], mat3.scale_vector(am, y)),
+        mat3.subtract(am, columns[2]),
     )
 
 
 def image_of_axis(images: Images, is_smallest: jax.Array, *, is_nearer: bool = True) -> Vec3:
     """(x, y, s) parallel to u + s e₃‖u‖ for u = R n, s the sign of its third component; (0, 0, 1) where u = 0."""
-    x, y, z = _mat3.where(is_smallest, _mat3.cross(images.e, images.g), images.n)
+    x, y, z = mat3.where(is_smallest, mat3.cross(images.e, images.g), images.n)
     length = jnp.abs(z) if is_nearer else z
-    x, y, z = computed_once(
-        (x, y, z), length + jnp.sqrt(_mat3.dot((x, y, z), (x, y, z))) + float(jnp.finfo(x.dtype).tiny)
+    x, y, z = fusion_barrier(
+        (x, y, z), length + jnp.sqrt(mat3.dot((x, y, z), (x, y, z))) + float(jnp.finfo(x.dtype).tiny)
     )
     return x, y, sign_of(z) if is_nearer else constant_like(z, 1)
 
@@ -177,18 +164,18 @@ def half_angle(images: Images, axis: Vec3) -> tuple[jax.Array, jax.Array, jax.Ar
     x, y, s = axis
     e, g, n = images
     half = 0.5 * (x * x + y * y + 1)
-    me, mg = _mat3.dot(axis, e), _mat3.dot(axis, g)
+    me, mg = mat3.dot(axis, e), mat3.dot(axis, g)
     c = (e[0] + s * g[1]) * half - (x * me + s * y * mg)
     d = (s * e[1] - g[0]) * half - (s * y * me - x * mg)
-    c, d = computed_once((c, d), half)
+    c, d = fusion_barrier((c, d), half)
     best = jnp.sqrt(c * c + d * d)
     large = best + jnp.abs(c) + _guard(c)
     is_behind = c < 0
-    trace = best + (_mat3.dot(axis, n) / half - s * n[2])
+    trace = best + (mat3.dot(axis, n) / half - s * n[2])
     return jnp.where(is_behind, d, large), jnp.where(is_behind, large, d), trace
 
 
-def quaternion(m: tuple[jax.Array, jax.Array], axis: Vec3, cosine: jax.Array, sine: jax.Array) -> Quaternion:
+def composed(m: tuple[jax.Array, jax.Array], axis: Vec3, cosine: jax.Array, sine: jax.Array) -> Quaternion:
     """The quaternion of R, any length but 0: (x', y', s) ∘ (cosine + sine k) ∘ (x, y, 1).
 
     Two reflections are two half turns about their axes. Where s = −1 the second one goes to the other side: then it is
@@ -209,7 +196,7 @@ def quaternion(m: tuple[jax.Array, jax.Array], axis: Vec3, cosine: jax.Array, si
         jnp.where(is_flipped, -k, j),
         jnp.where(is_flipped, j, k),
     )
-    return computed_once(q, jnp.abs(cosine) + jnp.abs(sine))
+    return fusion_barrier(q, jnp.abs(cosine) + jnp.abs(sine))
 
 
 def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kept: bool = True) -> Mat3:
@@ -217,17 +204,17 @@ def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kep
 
     A rotation has been scaled by 2 or by 4: AᵀA is 4 or 16 times the identity and the trace 6 or 12, that of −R 2 or 4.
     """
-    r, norm = _quaternion.to_scaled_rotation(q), _quaternion.squared_norm(q)
+    r, norm = quaternion.to_scaled_rotation(q), quaternion.squared_norm(q)
     if is_kept:
         is_large = (gram.xx > 8).astype(norm.dtype)
         power = 2 + (is_large + is_large)
         off = gram.xx - power * power
         is_rotation = (gram.p * gram.p + off * off < 4 * float(jnp.finfo(norm.dtype).eps)) & (trace > 2 * power)
         # The choice goes with the divisor, as its sign.
-        norm = computed_once(jnp.where(is_rotation, -power, norm))
-        r = _mat3.where(norm < 0, a, r)
+        norm = fusion_barrier(jnp.where(is_rotation, -power, norm))
+        r = mat3.where(norm < 0, a, r)
         norm = jnp.abs(norm)
-    return computed_once(r, norm)
+    return fusion_barrier(r, norm)
 
 
 def _guard(x: jax.Array) -> float:

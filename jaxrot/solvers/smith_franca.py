@@ -1,21 +1,17 @@
 """The closed form A (AᵀA)^(−1/2) with Smith's eigenvalues and Franca's square root."""
 
-import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_sqrt, scaled
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_sqrt
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """The nearest rotation of a matrix with det A > 0 whose singular values are not far apart.
 
     The square root of C = AᵀA comes from its eigenvalues by Cayley–Hamilton, without eigenvectors. For det A < 0 the
     formula gives the nearest *reflection*, for det A = 0 it divides by zero; both are returned as they are.
-
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
 
     Returns:
         (..., 3, 3). In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are good to
@@ -26,17 +22,16 @@ def solve(matrix: jax.Array) -> jax.Array:
     printed the eigenvalues do not add up to the trace. Franca 1989.
     """
     # notation: a0..a2 and b0..b2 are those of the paper.
-    a = scaled(_mat3.components(matrix))
-    c = _mat3.transpose_multiply(a, a)
+    c = mat3.transpose_multiply(a, a)
     s1, s2, s3 = (safe_sqrt(eigenvalue) for eigenvalue in smith_eigenvalues(c))
     a2, a1, a0 = s1 + s2 + s3, s1 * s2 + s1 * s3 + s2 * s3, s1 * s2 * s3
     denominator = a0 * (a2 * a1 - a0)
     b2 = a2 / denominator
     b1 = (a0 + a2 * (a2 * a2 - 2 * a1)) / denominator
     b0 = (a2 * a1 * a1 - a0 * (a2 * a2 + a1)) / denominator
-    polynomial = _mat3.add(_mat3.scale(_mat3.multiply(c, c), b2), _mat3.scale(c, -b1))
-    polynomial = _mat3.add(polynomial, _mat3.scale(_mat3.identity_like(c), b0))
-    return _mat3.stack(_mat3.multiply(a, polynomial))
+    polynomial = mat3.add(mat3.scale(mat3.multiply(c, c), b2), mat3.scale(c, -b1))
+    polynomial = mat3.add(polynomial, mat3.scale(mat3.identity_like(c), b0))
+    return mat3.multiply(a, polynomial)
 
 
 def smith_eigenvalues(c: Mat3) -> Vec3:
@@ -45,10 +40,10 @@ def smith_eigenvalues(c: Mat3) -> Vec3:
     Absolute accuracy: eps times the largest, and √eps times their spread where two of them are equal.
     """
     # notation: m, q, p and theta are those of the paper.
-    m = _mat3.trace(c) / 3
-    deviator = _mat3.add(c, _mat3.scale(_mat3.identity_like(c), -m))
-    q = _mat3.determinant(deviator) / 2
-    p = _mat3.squared_norm(deviator) / 6
+    m = mat3.trace(c) / 3
+    deviator = mat3.add(c, mat3.scale(mat3.identity_like(c), -m))
+    q = mat3.determinant(deviator) / 2
+    p = mat3.squared_norm(deviator) / 6
     # Where two eigenvalues are equal, rounding makes the discriminant negative.
     theta = jnp.arctan2(safe_sqrt(p * p * p - q * q), q) / 3
     root_p = safe_sqrt(p)

@@ -1,9 +1,8 @@
 """The torque iteration of Müller et al. 2016 from a cold start."""
 
-import jax
-
-from jaxrot import _mat3, _quaternion
-from jaxrot._scaling import unit_scaled
+from jaxrot._algebra import quaternion
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.scaling import unit_scaled
 from jaxrot.steps import torque
 from jaxrot.steps.iteration import iterate
 
@@ -11,20 +10,17 @@ from jaxrot.steps.iteration import iterate
 _ITERATIONS = 20
 
 
-def solve(matrix: jax.Array) -> jax.Array:
+def solve(a: Mat3) -> Mat3:
     """An approximation of the nearest rotation: 20 torque steps from the quaternion of A itself.
 
-    Args:
-        matrix: (..., 3, 3), float32 or float64, any scale.
-
     Returns:
-        (..., 3, 3) rotations. The error shrinks by max|sᵢ| / |Σsᵢ| a step: .333 for a multiple of a rotation, .9 for
+        Rotations. The error shrinks by max|sᵢ| / |Σsᵢ| a step: .333 for a multiple of a rotation, .9 for
         (1, .1, .01).
 
     Cost: about 150 flops, a sine, a cosine and two square roots a step.
     Source: Müller et al. 2016, section 3 and appendix D. Their start Quat(A)/|Quat(A)| depends on the scale of A, by
     its "+1" terms; here the scale is removed first.
     """
-    a = unit_scaled(_mat3.components(matrix))
-    q = iterate(torque.correction, a, _quaternion.from_rotation(a), _ITERATIONS)
-    return _quaternion.to_matrix(q)
+    a = unit_scaled(a)
+    q = iterate(torque.correction, a, quaternion.from_rotation(a), _ITERATIONS)
+    return quaternion.to_orthonormal(q)

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
 from jaxrot._frozen import FrozenMapping
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
 from jaxrot.steps import cayley, newton, quest, torque, torque_exact_angle
 
 

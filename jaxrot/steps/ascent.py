@@ -4,16 +4,13 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._choice import exchange, is_positive
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_sqrt
-
-# What `ascent` can leave out, to see what it costs.
-GUARDS = ("absolute pivots", "free axes")
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_sqrt
+from jaxrot._algebra.select import exchange, is_positive
 
 
-def ascent(h: Mat3, b: Mat3, v: Vec3, *, without: tuple[str, ...] = ()) -> Vec3:
+def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps_free_axes: bool = True) -> Vec3:
     """h⁻¹ v, with the pivots of LDLᵀ replaced by their absolute values; 1/p is p/(p² + δ²), so that 1/0 is 0.
 
     With diagonal pivoting, so that an axis without a gap shows in the last pivot and not in the rounding of the others.
@@ -22,11 +19,11 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, without: tuple[str, ...] = ()) -> Vec3:
         h: Symmetric, of any signature.
         b: QᵀA, whose size decides what is rounding.
         v: The right-hand side, the torque.
-        without: Names in `GUARDS` to leave out, static. Without *absolute pivots* it is h⁻¹ v, which leads to a saddle
-            where h is indefinite; without *free axes* the solution keeps its part along an axis without a gap.
+        has_absolute_pivots: Static. With False the result is h⁻¹ v, which leads to a saddle where h is indefinite.
+        keeps_free_axes: Static. With False the solution has any part along an axis without a gap.
     """
     delta, torque = _resolved(b)
-    magnitude = jnp.positive if "absolute pivots" in without else jnp.abs
+    magnitude = jnp.abs if has_absolute_pivots else jnp.positive
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     # The largest comes first. What is exchanged here is exchanged back, in reverse, at the end.
@@ -58,7 +55,7 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, without: tuple[str, ...] = ()) -> Vec3:
     x1 = (y1 * magnitude(s11) - s11 * s12 * x2) / (s11 * s11 + square)
     x0 = (v0 * magnitude(h00) - h00 * (h01 * x1 + h02 * x2)) / (h00 * h00 + square)
 
-    if "free axes" not in without:
+    if keeps_free_axes:
         # That solution has any part along u, which the last pivot belongs to; where the pivot is 0, the shortest has
         # none. Without this half of all starts turn about the axis that a matrix of rank 1 leaves free, by up to 90°.
         u0 = (h01 * l12 - h02) * inverse0
@@ -81,7 +78,7 @@ def _resolved(b: Mat3) -> tuple[jax.Array, jax.Array]:
     eps. A gap may also vanish on the way while the torque does not, a quarter turn off for example: without the second
     condition 9 of 167,000 random starts stayed there in float32. Both are 1 where B = 0, so that nothing is 0/0.
     """
-    norm = safe_sqrt(_mat3.squared_norm(b))
+    norm = safe_sqrt(mat3.squared_norm(b))
     norm = jnp.where(norm == 0, jnp.ones_like(norm), norm)
     eps = float(jnp.finfo(norm.dtype).eps)
     return eps ** (2 / 3) * norm, 64 * eps * norm

@@ -3,11 +3,11 @@
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import nonzero_sqrt, safe_sqrt
+from jaxrot._algebra import mat3
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import nonzero_sqrt, safe_sqrt
 from jaxrot.steps.damped import damped_solve
 
 
@@ -25,20 +25,20 @@ def correction(b: Mat3) -> Quaternion:
 
     Source: Zhang 2021, and the shift Zhang adds to Newton's matrix 2(t·1 − sym B). About 190 flops.
     """
-    b = computed_once(b)
+    b = fusion_barrier(b)
     return cayley_map(b, zhang_shift(b))
 
 
 def zhang_shift(b: Mat3) -> jax.Array:
     """√(t² + ‖d‖²) − t ≥ 0: half of ‖d‖²/t near the solution, so that the order stays cubic; large beyond 90°."""
-    t, d = _mat3.trace(b), _mat3.axial(b)
-    return nonzero_sqrt(t * t + _mat3.dot(d, d)) - t
+    t, d = mat3.trace(b), mat3.axial(b)
+    return nonzero_sqrt(t * t + mat3.dot(d, d)) - t
 
 
 def cayley_map(b: Mat3, shift: jax.Array) -> Quaternion:
     """The quaternion (1, z) with (2H + shift·1) z = d, H = tr(B)·1 − sym B, damped where that matrix is singular."""
-    h = _mat3.add_to_diagonal(_mat3.gap_matrix(b), shift * 0.5)
-    x, y, z = _mat3.scale_vector(damped_solve(h, resolved_gap(b), _mat3.axial(b)), 0.5)
+    h = mat3.add_to_diagonal(mat3.gap_matrix(b), shift * 0.5)
+    x, y, z = mat3.scale_vector(damped_solve(h, resolved_gap(b), mat3.axial(b)), 0.5)
     return (jnp.ones_like(x), x, y, z)
 
 
@@ -49,5 +49,5 @@ def resolved_gap(b: Mat3) -> jax.Array:
     be as small as eps: with 8 eps the free angle of a matrix of rank 1 turned by up to 3e-4. With this δ a gap of δ is
     twice as slow as it should be: κ ≈ 1e4 in float32.
     """
-    norm = safe_sqrt(_mat3.squared_norm(b))
+    norm = safe_sqrt(mat3.squared_norm(b))
     return jnp.where(norm == 0, jnp.ones_like(norm), 0.25 * float(jnp.finfo(norm.dtype).eps) ** 0.5 * norm)

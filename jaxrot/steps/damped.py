@@ -2,15 +2,15 @@
 
 import jax
 
-from jaxrot._choice import exchange, is_positive
-from jaxrot._complex import Complex, divide, multiply, reciprocal, subtract, times
-from jaxrot._mat3 import Mat3, Vec3
+from jaxrot._algebra.complex import Complex, divide, multiply, reciprocal, subtract, times
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.select import exchange, is_positive
 
 
 def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
     """H(H²+δ²)⁻¹ v = Re[(H+iδ)⁻¹ v].
 
-    The factorisation is LDLᵀ of the complex symmetric H+iδ. Unlike `_derivative.damped_inverse` it exchanges rows, so
+    The factorisation is LDLᵀ of the complex symmetric H+iδ. Unlike `rule.damped_inverse` it exchanges rows, so
     that H may be indefinite, as it is far from the solution, and divides last, so that along a free axis, where the
     result is rounding, all components have the same.
 

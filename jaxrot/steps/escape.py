@@ -2,12 +2,12 @@
 
 import jax.numpy as jnp
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._choice import constant_like
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_sqrt
-from jaxrot._symmetric import eigen
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.eigh import eigen
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import safe_sqrt
+from jaxrot._algebra.select import constant_like
 
 # An eigenvalue of the gap matrix above −4 eps ‖A‖ is zero.
 _ZERO = 4
@@ -34,19 +34,19 @@ def leave_equilibrium(a: Mat3, q: Quaternion) -> Quaternion:
     Source: Müller et al. 2016, after eq. (8), where the perturbation is random and may have to be repeated. About 330
     flops, as many as a `newton` step.
     """
-    b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
-    torque = _mat3.axial(b)
-    h = _mat3.gap_matrix(b)
+    b = mat3.transpose_multiply(quaternion.to_rotation(q), a)
+    torque = mat3.axial(b)
+    h = mat3.gap_matrix(b)
     _, (_, _, axis) = eigen(h)
     # notation: the best angle φ is atan2(s, c); c is negative, so that |cot(φ/2)| < ½.
-    s, c = _mat3.dot(torque, axis), _mat3.dot(axis, _mat3.apply(h, axis))
-    zero = _ZERO * float(jnp.finfo(c.dtype).eps) * safe_sqrt(_mat3.squared_norm(b))
-    leaves = (c < -zero) & (_mat3.dot(torque, torque) <= c * c)
+    s, c = mat3.dot(torque, axis), mat3.dot(axis, mat3.apply(h, axis))
+    zero = _ZERO * float(jnp.finfo(c.dtype).eps) * safe_sqrt(mat3.squared_norm(b))
+    leaves = (c < -zero) & (mat3.dot(torque, torque) <= c * c)
 
     # XLA computes what is cheap again for each component, where torque is rounding with another result: w might leave
     # and x stay. A quotient it computes once, so that both the angle and the decision, 2 for no, are in one.
     two = constant_like(c, 2)
     cotangent = jnp.where(leaves, s, two) / jnp.where(leaves, safe_sqrt(s * s + c * c) - c, jnp.ones_like(c))
-    turned = _quaternion.normalise(_quaternion.product(q, (cotangent, *axis)))
+    turned = quaternion.normalise(quaternion.product(q, (cotangent, *axis)))
     w, x, y, z = (jnp.where(cotangent < 1, new, old) for new, old in zip(turned, q, strict=True))
     return (w, x, y, z)

@@ -2,10 +2,10 @@
 
 import jax.numpy as jnp
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import nonzero_sqrt
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import nonzero_sqrt
 
 # Below 4 eps ‖B‖ the trace depends on the angle by rounding alone. And a torque below 1 eps ‖B‖ is rounding: followed,
 # it turned some of 20,000 matrices of rank 1 by 600 eps about the axis that they leave free, instead of 13 at most.
@@ -22,7 +22,7 @@ def turn_about(h: Mat3, torque: Vec3, axis: Vec3, *, flat: float = _FLAT) -> Qua
     Args:
         h: H = tr(B)·1 − sym B for B = QᵀA.
         torque: d = vee(B − Bᵀ).
-        axis: Any length. Its components must be computed once, quotients for example: see `_choice`.
+        axis: Any length. Its components must be computed once, quotients for example: see `fusion`.
         flat: In units of eps ‖B‖, what the trace may vary by along the circle and still count as constant.
 
     Returns:
@@ -31,18 +31,18 @@ def turn_about(h: Mat3, torque: Vec3, axis: Vec3, *, flat: float = _FLAT) -> Qua
 
     Source: Wahba's problem on the circle of rotations about n. About 65 flops.
     """
-    length = nonzero_sqrt(_mat3.dot(axis, axis))
+    length = nonzero_sqrt(mat3.dot(axis, axis))
     x, y, z = axis[0] / length, axis[1] / length, axis[2] / length
-    s, c = _mat3.dot(torque, (x, y, z)), _mat3.dot((x, y, z), _mat3.apply(h, (x, y, z)))
+    s, c = mat3.dot(torque, (x, y, z)), mat3.dot((x, y, z), mat3.apply(h, (x, y, z)))
     r = nonzero_sqrt(s * s + c * c)
     # (cos φ/2, sin φ/2) ∝ (r + c, s). Where c < 0 that cancels, and (|s|, ±(r − c)) is the same direction.
     sine = jnp.where(c >= 0, s, jnp.where(s < 0, c - r, r - c))
     cosine = jnp.where(c >= 0, r + c, jnp.abs(s))
     # ‖B‖ to a factor of 2, from what is given.
-    size = nonzero_sqrt(_mat3.squared_norm(h) + 0.5 * _mat3.dot(torque, torque))
+    size = nonzero_sqrt(mat3.squared_norm(h) + 0.5 * mat3.dot(torque, torque))
     rounding = float(jnp.finfo(r.dtype).eps) * size
     is_flat = (r <= flat * rounding) | ((c > 0) & (jnp.abs(s) <= 0.25 * flat * rounding))
     # One quotient holds the angle and all its choices, so that the four components agree where s and c are rounding.
     half = nonzero_sqrt(sine * sine + cosine * cosine)
     quarter = jnp.where(is_flat, jnp.zeros_like(sine), sine) / (half + cosine)
-    return (1 - quarter * quarter, *_mat3.scale_vector((x, y, z), 2 * quarter))
+    return (1 - quarter * quarter, *mat3.scale_vector((x, y, z), 2 * quarter))

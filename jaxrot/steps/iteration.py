@@ -5,10 +5,10 @@ from collections.abc import Callable
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._choice import computed_once
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
 
 
 def iterate(correction: Callable[[Mat3], Quaternion], a: Mat3, q: Quaternion, iterations: int) -> Quaternion:
@@ -25,8 +25,8 @@ def iterate(correction: Callable[[Mat3], Quaternion], a: Mat3, q: Quaternion, it
     """
 
     def advance(_, q: Quaternion) -> Quaternion:
-        b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
-        q = _quaternion.product(q, correction(b))
-        return computed_once(q, jnp.sqrt(_quaternion.squared_norm(q)))
+        b = mat3.transpose_multiply(quaternion.to_rotation(q), a)
+        q = quaternion.product(q, correction(b))
+        return fusion_barrier(q, jnp.sqrt(quaternion.squared_norm(q)))
 
     return lax.fori_loop(0, iterations, advance, q)

@@ -1,9 +1,9 @@
 """Newton's axis with the best angle about it."""
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
+from jaxrot._algebra import mat3
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
 from jaxrot.steps.ascent import ascent
 from jaxrot.steps.cayley import zhang_shift
 from jaxrot.steps.exact_angle import turn_about
@@ -28,7 +28,7 @@ def correction(b: Mat3) -> Quaternion:
     Source: Kugelstadt et al. 2018 (analytic polar decomposition) for Newton's axis; Zhang 2021 for the shift. About 240
     flops.
     """
-    b = computed_once(b)
-    h, torque = _mat3.gap_matrix(b), _mat3.axial(b)
-    shifted = _mat3.add_to_diagonal(h, zhang_shift(b) * 0.5)
+    b = fusion_barrier(b)
+    h, torque = mat3.gap_matrix(b), mat3.axial(b)
+    shifted = mat3.add_to_diagonal(h, zhang_shift(b) * 0.5)
     return turn_about(h, torque, ascent(shifted, b, torque))

@@ -4,11 +4,11 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_divide, safe_sqrt
+from jaxrot._algebra import mat3
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 from jaxrot.steps.cayley import cayley_map
 
 # As many as the quartic needs near its double root, where Newton's method only halves the distance; see `solvers.foam`.
@@ -36,9 +36,9 @@ def correction(b: Mat3) -> Quaternion:
     Source: Shuster and Oh, "Three-axis attitude determination from vector observations" (QUEST), 1981. About 250 flops
     and 14 (float32) or 28 (float64) Newton steps of 12.
     """
-    b = computed_once(b)
+    b = fusion_barrier(b)
     # f is at least the trace of any rotation of A; less is rounding.
-    shift = sum_of_singular_values(b) - _mat3.trace(b)
+    shift = sum_of_singular_values(b) - mat3.trace(b)
     return cayley_map(b, jnp.where(shift < 0, jnp.zeros_like(shift), shift))
 
 
@@ -49,10 +49,10 @@ def sum_of_singular_values(a: Mat3) -> jax.Array:
     cancellation in f, f = √(I + 2√(K + 2Jf)) for J ≥ 0, is no better: to rank 1 both are off by 25 eps s1 at s2 = 1e-3,
     from the rounding in J.
     """
-    cofactor = _mat3.cofactor(a)
-    square = _mat3.squared_norm(a)
-    squared_cofactor = _mat3.squared_norm(cofactor)
-    determinant = _mat3.dot(a[0], cofactor[0])
+    cofactor = mat3.cofactor(a)
+    square = mat3.squared_norm(a)
+    squared_cofactor = mat3.squared_norm(cofactor)
+    determinant = mat3.dot(a[0], cofactor[0])
 
     def newton(_, f: jax.Array) -> jax.Array:
         excess = (f * f - square) * 0.5

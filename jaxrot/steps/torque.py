@@ -2,10 +2,10 @@
 
 import jax.numpy as jnp
 
-from jaxrot import _mat3, _quaternion
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_divide, safe_sqrt
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 
 
 def correction(b: Mat3) -> Quaternion:
@@ -24,6 +24,6 @@ def correction(b: Mat3) -> Quaternion:
     starts fail for A = 1), with r×a as in (4), not a×r as in (5), and with ε inside the reciprocal and relative to ‖A‖
     instead of 1e-9 outside it (appendix D), which is NaN for A = 0 and wrong at other scales. About 90 flops.
     """
-    epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(_mat3.squared_norm(b))
-    inverse = safe_divide(jnp.ones_like(epsilon), jnp.abs(_mat3.trace(b)) + epsilon)
-    return _quaternion.exponential(_mat3.scale_vector(_mat3.axial(b), inverse))
+    epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(mat3.squared_norm(b))
+    inverse = safe_divide(jnp.ones_like(epsilon), jnp.abs(mat3.trace(b)) + epsilon)
+    return quaternion.exponential(mat3.scale_vector(mat3.axial(b), inverse))

@@ -1,8 +1,8 @@
 """The torque's axis with the best angle about it."""
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3
-from jaxrot._quaternion import Quaternion
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.quaternion import Quaternion
 from jaxrot.steps.exact_angle import turn_about
 
 
@@ -20,5 +20,5 @@ def correction(b: Mat3) -> Quaternion:
 
     Source: Müller et al. 2016, eq. (4), for the axis; `exact_angle.turn_about` for the angle. About 70 flops.
     """
-    torque = _mat3.axial(b)
-    return turn_about(_mat3.gap_matrix(b), torque, torque)
+    torque = mat3.axial(b)
+    return turn_about(mat3.gap_matrix(b), torque, torque)

@@ -53,7 +53,7 @@ def _in_a_process(folder, words, **where):
         ("numpy.linalg._umath_linalg", ["simulate", "drift"]),
         ("jax._src.core", ["recommend", "none.npy", "--tolerance", "1"]),
         ("jaxlib.mlir.ir", ["report", "--quick"]),
-        ("jaxrot._mat3", ["--help"]),
+        ("jaxrot._algebra.mat3", ["--help"]),
         ("jaxrot.report.peers.warp_svd", ["simulate", "drift"]),
         ("jaxrot.simulate.command", ["recommend", "none.npy", "--tolerance", "1"]),
     ],

@@ -8,13 +8,13 @@ import pytest
 from jaxrot import STEPS, _refine
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
+from jaxrot.report.guards import default_method
 from jaxrot.report.guards import prices as guards
 from jaxrot.report.guards import steps as step_guards
 from jaxrot.report.guards.prices import Guards, Price, Size, Time, compare_times
 from jaxrot.report.guards.starts import FAR, HALF_TURN, NEAR, NEAREST, judge_step, pose
 from jaxrot.report.guards.tables import guards_table
 from jaxrot.report.guards.verdict import NOT_FINITE, Broken, Verdict, broken_families, judge_contract, sample_families
-from jaxrot.solvers import singular_pair
 
 TINY = Size(batch=1, matrices_a_family=3, starts_a_family=1, budget_s=0.0, dtypes=("float32",))
 SECONDS = {"": 4.0, "largest column": 3.0, "renormalisation": 4.0, "escape": 8.0}
@@ -27,7 +27,7 @@ def told_times(programs, given, budget_s):
 @pytest.fixture(scope="module")
 def default():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(singular_pair, "GUARDS", ("largest column", "renormalisation"))
+        patch.setattr(default_method, "GUARDS", ("largest column", "renormalisation"))
         patch.setattr(guards, "time_side_by_side", told_times)
         return {price.guard: price for price in guards.price_default(TINY, "float32")}
 
@@ -104,6 +104,12 @@ def test_without_renormalisation_a_step_is_left_with_a_quaternion_of_another_len
     assert broken["rotation"].promise == "length"
     assert broken["rotation"].worst > 1e3
     assert "zero" not in broken
+
+
+def test_the_default_method_with_all_guards_is_the_librarys_own_program():
+    matrix = np.zeros((2, 3, 3), np.float32)
+    composed, own = jax.jit(default_method.solve), jax.jit(nearest_rotation)
+    assert composed.lower(matrix).as_text().split("{", 1)[1] == own.lower(matrix).as_text().split("{", 1)[1]
 
 
 @pytest.mark.exhaustive

@@ -1,14 +1,15 @@
 """The inversion and rank cases of Müller et al. 2016, appendix C."""
 
-import jax
+import functools
+
 import numpy as np
 import pytest
 
+from jaxrot import nearest_rotation
 from jaxrot.families import FAMILIES
 from jaxrot.measuring import reference
-from jaxrot.solvers import irving
 
-solve = jax.jit(irving.solve)
+solve = functools.partial(nearest_rotation, method="irving")
 
 
 def composed(s, dtype, count=64):

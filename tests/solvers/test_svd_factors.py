@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxrot import _mat3
-from jaxrot._scaling import safe_divide, scaled
+from jaxrot._algebra import mat3
+from jaxrot._algebra.scaling import safe_divide, scaled
 from jaxrot.families import FAMILIES
 from jaxrot.measuring import reference
 from jaxrot.solvers import implicit_qr_svd, jacobi_svd
@@ -17,11 +17,11 @@ MODULES = pytest.mark.parametrize("module", [jacobi_svd, implicit_qr_svd], ids=[
 def decompose(module):
     @jax.jit
     def function(matrix):
-        m = _mat3.components(matrix)
+        m = mat3.components(matrix)
         a = scaled(m)
         left, s, right = module.decompose(a)
-        power = safe_divide(_mat3.largest_entry(m), _mat3.largest_entry(a))
-        return _mat3.stack(left), jnp.stack(s, axis=-1) * power[..., None], _mat3.stack(right)
+        power = safe_divide(mat3.largest_entry(m), mat3.largest_entry(a))
+        return mat3.stack(left), jnp.stack(s, axis=-1) * power[..., None], mat3.stack(right)
 
     return function
 

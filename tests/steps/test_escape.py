@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxrot import _mat3, _quaternion, refine_quaternion_wxyz, refine_rotation
-from jaxrot._scaling import scaled
+from jaxrot import refine_quaternion_wxyz, refine_rotation
+from jaxrot._algebra import mat3, quaternion
+from jaxrot._algebra.scaling import scaled
 from jaxrot.families import FAMILIES, half_turn_starts
 from jaxrot.measuring import reference
 from jaxrot.steps.escape import leave_equilibrium
@@ -63,9 +64,9 @@ def test_a_start_that_is_nearest_is_kept_bit_for_bit():
     free = np.abs(np.asarray(solved.singular_values[:, 1])) < 1e-12
     assert 100 <= free.sum() < len(free)
     start = jnp.asarray(np.where(free[:, None, None], start @ turn, start))
-    q = _quaternion.from_rotation(_mat3.components(start))
-    a = scaled(_mat3.components(jnp.asarray(matrices)))
-    np.testing.assert_array_equal(_quaternion.stack(jax.jit(leave_equilibrium)(a, q)), _quaternion.stack(q))
+    q = quaternion.from_rotation(mat3.components(start))
+    a = scaled(mat3.components(jnp.asarray(matrices)))
+    np.testing.assert_array_equal(quaternion.stack(jax.jit(leave_equilibrium)(a, q)), quaternion.stack(q))
 
 
 def test_near_the_nearest_rotation_nothing_is_turned_even_where_an_eigenvalue_is_negative():

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from certificate import assert_rotations
 
-from jaxrot import STEPS, _mat3, _quaternion, refine_rotation
+from jaxrot import STEPS, refine_rotation
+from jaxrot._algebra import mat3, quaternion
 from jaxrot.families import FAMILIES, half_turn_starts
 from jaxrot.measuring import reference
 from jaxrot.steps.exact_angle import turn_about
@@ -168,9 +169,9 @@ def test_the_best_angle_about_any_axis_is_found():
     """The axes of the steps are of ascent; here it lies behind as often as before, and beyond 90° too."""
     random = np.random.default_rng(5)
     matrices, axes = random.standard_normal((200, 3, 3)), random.standard_normal((200, 3))
-    b = _mat3.components(jnp.asarray(matrices))
-    correction = turn_about(_mat3.gap_matrix(b), _mat3.axial(b), (axes[:, 0], axes[:, 1], axes[:, 2]))
-    reached = np.einsum("nij,nij->n", _mat3.stack(_quaternion.to_rotation(correction)), matrices)
+    b = mat3.components(jnp.asarray(matrices))
+    correction = turn_about(mat3.gap_matrix(b), mat3.axial(b), (axes[:, 0], axes[:, 1], axes[:, 2]))
+    reached = np.einsum("nij,nij->n", mat3.stack(quaternion.to_rotation(correction)), matrices)
     unit = axes / np.linalg.norm(axes, axis=1)[:, None]
     constant = np.einsum("ni,nij,nj->n", unit, matrices, unit)
     d = np.stack([matrices[:, 2, 1], matrices[:, 0, 2], matrices[:, 1, 0]], 1)

@@ -13,10 +13,10 @@ import jaxrot
 from jaxrot import STEPS
 from jaxrot.measuring.judging import judge
 from jaxrot.measuring.timing import interleave
+from jaxrot.report.guards import default_method
 from jaxrot.report.guards import steps as step_guards
 from jaxrot.report.guards.starts import HALF_TURN, ITERATIONS, Posed, judge_step, pose
 from jaxrot.report.guards.verdict import Broken, Verdict, broken_families, judge_contract, sample_families
-from jaxrot.solvers import singular_pair
 
 # Of equal times three in four of that many rounds agree by chance once in 80 times, of 12 rounds once in 7.
 _FEWEST_ROUNDS = 20
@@ -128,10 +128,8 @@ def price_default(size: Size, dtype: str) -> list[Price]:
     count = len(judged.matrices)
     given = jnp.asarray(_gaussian(max(size.batch, count), dtype))
 
-    def solver(guard: str) -> Callable[[jax.Array], jax.Array]:
-        return lambda matrix: singular_pair.solve(matrix, without=(guard,) if guard else ())
-
-    programs = _compile({guard: jax.jit(solver(guard)).lower(given) for guard in ("", *singular_pair.GUARDS)})
+    solve = jax.jit(default_method.solve, static_argnames="without")
+    programs = _compile({guard: solve.lower(given, without=guard) for guard in ("", *default_method.GUARDS)})
     seconds = time_side_by_side(programs, (given,), size.budget_s)
     filled = jnp.asarray(np.resize(judged.matrices, given.shape))
     verdicts = {guard: judge_contract(np.asarray(call(filled))[:count], judged) for guard, call in programs.items()}

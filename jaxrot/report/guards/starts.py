@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxrot import _mat3, _quaternion
+from jaxrot._algebra import mat3, quaternion
 from jaxrot.families import half_turn_starts
 from jaxrot.measuring import domain
 from jaxrot.measuring.judging import Judged, judge
@@ -57,13 +57,13 @@ def pose(sets: Mapping[str, np.ndarray], dtype: str) -> Posed:
 
 @jax.jit
 def _turned(rotation: jax.Array, turn: jax.Array) -> jax.Array:
-    q = _quaternion.from_rotation(_mat3.components(rotation))
-    return _quaternion.stack(_quaternion.normalise(_quaternion.product(q, _quaternion.components(turn))))
+    q = quaternion.from_rotation(mat3.components(rotation))
+    return quaternion.stack(quaternion.normalise(quaternion.product(q, quaternion.components(turn))))
 
 
 @jax.jit
-def _rotation(quaternion: jax.Array) -> jax.Array:
-    return _mat3.stack(_quaternion.to_rotation(_quaternion.components(quaternion)))
+def _rotation(wxyz: jax.Array) -> jax.Array:
+    return mat3.stack(quaternion.to_rotation(quaternion.components(wxyz)))
 
 
 def judge_step(

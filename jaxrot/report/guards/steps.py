@@ -6,12 +6,13 @@ from types import MappingProxyType
 import jax
 import jax.numpy as jnp
 
-from jaxrot import STEPS, _definite, _mat3, _quaternion
-from jaxrot._choice import computed_once
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._quaternion import Quaternion
-from jaxrot._scaling import safe_divide, safe_sqrt, scaled
-from jaxrot.steps import ascent
+from jaxrot import STEPS
+from jaxrot._algebra import ldl, mat3, quaternion
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.quaternion import Quaternion
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt, scaled
+from jaxrot.steps.ascent import ascent
 from jaxrot.steps.cayley import cayley_map, zhang_shift
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.exact_angle import turn_about
@@ -25,7 +26,7 @@ _COMMON = ("scale", "renormalisation", ESCAPE)
 _OWN = {
     "torque": ("absolute value", "epsilon"),
     "torque_exact_angle": ("flat circle",),
-    "newton": ("Zhang's shift", *ascent.GUARDS, "flat circle"),
+    "newton": ("Zhang's shift", "absolute pivots", "free axes", "flat circle"),
     "cayley": ("Zhang's shift", "damping"),
     "quest": ("root above trace", "damping"),
 }
@@ -49,52 +50,59 @@ def one_step(step: str, without: tuple[str, ...] = ()) -> Callable[[jax.Array, j
     def correction(b: Mat3) -> Quaternion:
         return _CORRECTIONS[step](b, own)
 
-    def advance(matrix: jax.Array, quaternion: jax.Array) -> jax.Array:
-        a = _mat3.components(matrix)
+    def advance(matrix: jax.Array, wxyz: jax.Array) -> jax.Array:
+        a = mat3.components(matrix)
         if "scale" not in without:
             a = scaled(a)
         zero = a[0][0] * 0
-        w, x, y, z = _quaternion.components(quaternion)
+        w, x, y, z = quaternion.components(wxyz)
         q = (w + zero, x + zero, y + zero, z + zero)
         if ESCAPE not in without:
             q = leave_equilibrium(a, q)
         if "renormalisation" not in without:
-            return _quaternion.stack(iterate(correction, a, q, 1))
-        b = _mat3.transpose_multiply(_quaternion.to_rotation(q), a)
-        return _quaternion.stack(_quaternion.product(q, correction(b)))
+            return quaternion.stack(iterate(correction, a, q, 1))
+        b = mat3.transpose_multiply(quaternion.to_rotation(q), a)
+        return quaternion.stack(quaternion.product(q, correction(b)))
 
     return advance
 
 
 def _torque(b: Mat3, without: tuple[str, ...]) -> Quaternion:
-    epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(_mat3.squared_norm(b))
+    epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(mat3.squared_norm(b))
     one = jnp.ones_like(epsilon)
-    size = _mat3.trace(b) if "absolute value" in without else jnp.abs(_mat3.trace(b))
+    size = mat3.trace(b) if "absolute value" in without else jnp.abs(mat3.trace(b))
     inverse = safe_divide(one, size if "epsilon" in without else size + epsilon)
-    return _quaternion.exponential(_mat3.scale_vector(_mat3.axial(b), inverse))
+    return quaternion.exponential(mat3.scale_vector(mat3.axial(b), inverse))
 
 
 def _torque_exact_angle(b: Mat3, without: tuple[str, ...]) -> Quaternion:
-    torque = _mat3.axial(b)
-    return _turn_about(_mat3.gap_matrix(b), torque, torque, without)
+    torque = mat3.axial(b)
+    return _turn_about(mat3.gap_matrix(b), torque, torque, without)
 
 
 def _newton(b: Mat3, without: tuple[str, ...]) -> Quaternion:
-    b = computed_once(b)
-    h, torque = _mat3.gap_matrix(b), _mat3.axial(b)
-    shifted = h if "Zhang's shift" in without else _mat3.add_to_diagonal(h, zhang_shift(b) * 0.5)
-    return _turn_about(h, torque, ascent.ascent(shifted, b, torque, without=without), without)
+    b = fusion_barrier(b)
+    h, torque = mat3.gap_matrix(b), mat3.axial(b)
+    shifted = h if "Zhang's shift" in without else mat3.add_to_diagonal(h, zhang_shift(b) * 0.5)
+    axis = ascent(
+        shifted,
+        b,
+        torque,
+        has_absolute_pivots="absolute pivots" not in without,
+        keeps_free_axes="free axes" not in without,
+    )
+    return _turn_about(h, torque, axis, without)
 
 
 def _cayley(b: Mat3, without: tuple[str, ...]) -> Quaternion:
-    b = computed_once(b)
+    b = fusion_barrier(b)
     shift = jnp.zeros_like(b[0][0]) if "Zhang's shift" in without else zhang_shift(b)
     return _cayley_map(b, shift, without)
 
 
 def _quest(b: Mat3, without: tuple[str, ...]) -> Quaternion:
-    b = computed_once(b)
-    shift = sum_of_singular_values(b) - _mat3.trace(b)
+    b = fusion_barrier(b)
+    shift = sum_of_singular_values(b) - mat3.trace(b)
     above = shift if "root above trace" in without else jnp.where(shift < 0, jnp.zeros_like(shift), shift)
     return _cayley_map(b, above, without)
 
@@ -107,8 +115,8 @@ def _cayley_map(b: Mat3, shift: jax.Array, without: tuple[str, ...]) -> Quaterni
     """Without damping: a solve for definite matrices, without exchanges, in the place of the damped one."""
     if "damping" not in without:
         return cayley_map(b, shift)
-    h = _mat3.add_to_diagonal(_mat3.gap_matrix(b), shift * 0.5)
-    x, y, z = _mat3.scale_vector(_definite.solve(h, _mat3.axial(b)), 0.5)
+    h = mat3.add_to_diagonal(mat3.gap_matrix(b), shift * 0.5)
+    x, y, z = mat3.scale_vector(ldl.solve(h, mat3.axial(b)), 0.5)
     return (jnp.ones_like(x), x, y, z)
 
 

@@ -9,18 +9,18 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import power_of_two_factor
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import power_of_two_factor
 
 
-def factor_of(matrix: Mat3) -> jax.Array:
+def normalising_factor(matrix: Mat3) -> jax.Array:
     """The power of two that normalises A; 0 where A = 0, which makes every derivative there 0."""
-    magnitude = _mat3.largest_entry(lax.stop_gradient(matrix))
+    magnitude = mat3.largest_entry(lax.stop_gradient(matrix))
     return jnp.where(magnitude == 0, jnp.zeros_like(magnitude), power_of_two_factor(magnitude))
 
 
-def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
+def saturate(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """The factor, saturated so that the derivatives up to this order stay finite where they would overflow.
 
     The n-th derivative grows like factorⁿ·norm²ⁿ⁻¹: each one more has the map on both sides. Beyond what the dtype
@@ -48,13 +48,13 @@ def gain(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     return jnp.where(is_zero, jnp.zeros_like(scale), scale)
 
 
-def halves(scale: jax.Array) -> tuple[jax.Array, jax.Array]:
+def split_scale(scale: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Two factors of about the same size, the first a power of two, whose product is the scale ≥ 0."""
     first = power_of_two_factor(lax.rsqrt(jnp.where(scale > 0, scale, jnp.ones_like(scale))))
     return first, scale / first
 
 
-def scaled_response(response: Callable[[Vec3], Vec3], load: Vec3, scale: jax.Array) -> Vec3:
+def apply_scaled(response: Callable[[Vec3], Vec3], load: Vec3, scale: jax.Array) -> Vec3:
     """A linear map of a vector, times a scale ≥ 0 as large or as small as the dtype has.
 
     The scale is applied in two halves, before and after: at once it could overflow or underflow on one side. Both are
@@ -63,8 +63,8 @@ def scaled_response(response: Callable[[Vec3], Vec3], load: Vec3, scale: jax.Arr
     """
     # 1/0 would be infinite, which `checkify` and `jax_debug_infs` report.
     is_zero = scale == 0
-    before, after = halves(jnp.where(is_zero, jnp.ones_like(scale), scale))
-    load = _mat3.where(is_zero, _mat3.scale_vector(load, 0.0), load)
+    before, after = split_scale(jnp.where(is_zero, jnp.ones_like(scale), scale))
+    load = mat3.where(is_zero, mat3.scale_vector(load, 0.0), load)
     return _divided(response(_divided(load, 1 / before)), 1 / after)
 
 

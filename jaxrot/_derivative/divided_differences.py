@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from jaxrot._derivative import resolved_gap
-from jaxrot._mat3 import Vec3
+from jaxrot._algebra.mat3 import Vec3
+from jaxrot._derivative.rule import resolved_gap
 
 # The planes (y, z), (z, x), (x, y), in the order of the axes across them.
 PLANES = ((1, 2), (2, 0), (0, 1))

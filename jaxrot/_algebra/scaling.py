@@ -6,9 +6,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once, constant_like
-from jaxrot._mat3 import Mat3
+from jaxrot._algebra import mat3
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.mat3 import Mat3
+from jaxrot._algebra.select import constant_like
 
 _Tree = TypeVar("_Tree")
 
@@ -52,7 +53,7 @@ def unscaled(values: _Tree, m: object) -> _Tree:
 
 def _size(m: object) -> jax.Array:
     # `scaled` and `unscaled` must see the same number, also where a quotient is inexact.
-    return computed_once(_mat3.largest_entry(m))
+    return fusion_barrier(mat3.largest_entry(m))
 
 
 def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
@@ -64,11 +65,10 @@ def _exponent(magnitude: jax.Array) -> tuple[jax.Array, int]:
 
 
 def unit_scaled(m: Mat3) -> Mat3:
-    """The matrix with the Frobenius norm √3 of a rotation; a zero matrix stays zero."""
-    m = scaled(m)
-    norm = safe_sqrt(_mat3.squared_norm(m))
+    """A matrix, already `scaled`, with the Frobenius norm √3 of a rotation; a zero matrix stays zero."""
+    norm = safe_sqrt(mat3.squared_norm(m))
     # The factor is exactly 1 for a rotation. With another form `taylor` rounds every entry and drifts twice as far.
-    return computed_once(_mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm)))
+    return fusion_barrier(mat3.scale(m, safe_divide(jnp.full_like(norm, 3**0.5), norm)))
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:

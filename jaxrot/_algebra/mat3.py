@@ -11,8 +11,8 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot._choice import constant_like
-from jaxrot._platform import platform
+from jaxrot._algebra.platform import platform
+from jaxrot._algebra.select import constant_like
 
 # notation: a matrix is a tuple of rows, each a tuple of three arrays of one batch shape; a vector is such a row.
 Vec3 = tuple[jax.Array, jax.Array, jax.Array]

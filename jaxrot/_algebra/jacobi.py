@@ -4,10 +4,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._choice import constant_like, sign_of
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_divide, safe_sqrt
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
+from jaxrot._algebra.select import constant_like, sign_of
 
 # notation: a plane rotation is (c, s), cosine and sine; it takes the pair (x, y) to (c x + s y, c y − s x).
 PlaneRotation = tuple[jax.Array, jax.Array]
@@ -38,7 +38,7 @@ def rotate_rows(r: PlaneRotation, m: Mat3, i: int, j: int) -> Mat3:
 
 def rolled(condition: jax.Array, m: Mat3) -> Mat3:
     """The rows in the order (1, 2, 0) where `condition` holds: a rotation of the frame, whose determinant is +1."""
-    return _mat3.where(condition, (m[1], m[2], m[0]), m)
+    return mat3.where(condition, (m[1], m[2], m[0]), m)
 
 
 def givens(x: jax.Array, y: jax.Array) -> PlaneRotation:
@@ -106,8 +106,8 @@ def symmetric_eigen(m: Mat3) -> tuple[Vec3, Mat3]:
         return (xx + t * xy, yy - t * xy, zz), (yz, xz, zero), rotate_rows(rotation, axes, 0, 1)
 
     zero = constant_like(m[0][0], 0)
-    negligible = float(jnp.finfo(zero.dtype).eps) / 4 * jnp.abs(_mat3.trace(m))
-    start = ((m[0][0], m[1][1], m[2][2]), (m[1][2], m[0][2], m[0][1]), _mat3.identity_like(m))
+    negligible = float(jnp.finfo(zero.dtype).eps) / 4 * jnp.abs(mat3.trace(m))
+    start = ((m[0][0], m[1][1], m[2][2]), (m[1][2], m[0][2], m[0][1]), mat3.identity_like(m))
     values, _, axes = lax.fori_loop(0, _EIGEN_ROTATIONS, step, start)
     return values, axes
 
@@ -132,10 +132,10 @@ def ordered_svd(left: Mat3, diagonal: Vec3, right: Mat3) -> tuple[Mat3, Vec3, Ma
         d[i], d[j] = jnp.where(is_smaller, d[j], d[i]), jnp.where(is_smaller, d[i], d[j])
         for axes in (u, v):
             # Exchanged by a quarter turn, so that the determinant stays +1.
-            opposite = _mat3.scale_vector(axes[i], -1.0)
-            axes[i], axes[j] = _mat3.where(is_smaller, axes[j], axes[i]), _mat3.where(is_smaller, opposite, axes[j])
+            opposite = mat3.scale_vector(axes[i], -1.0)
+            axes[i], axes[j] = mat3.where(is_smaller, axes[j], axes[i]), mat3.where(is_smaller, opposite, axes[j])
     for i in (0, 1):
         sign = sign_of(d[i])
         d[i], d[2] = d[i] * sign, d[2] * sign
-        u[i], u[2] = _mat3.scale_vector(u[i], sign), _mat3.scale_vector(u[2], sign)
-    return _mat3.transpose((u[0], u[1], u[2])), (d[0], d[1], d[2]), _mat3.transpose((v[0], v[1], v[2]))
+        u[i], u[2] = mat3.scale_vector(u[i], sign), mat3.scale_vector(u[2], sign)
+    return mat3.transpose((u[0], u[1], u[2])), (d[0], d[1], d[2]), mat3.transpose((v[0], v[1], v[2]))

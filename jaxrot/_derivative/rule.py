@@ -14,10 +14,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxrot import _mat3
-from jaxrot._complex import add, multiply, reciprocal, square, subtract, times
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._saturation import factor_of, gain, halves, scaled_response
+from jaxrot._algebra import mat3
+from jaxrot._algebra.complex import add, multiply, reciprocal, square, subtract, times
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._derivative.overflow import apply_scaled, normalising_factor, saturate, split_scale
 
 # The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
 # 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
@@ -28,9 +28,9 @@ def rotation_tangent(
     matrix: jax.Array, rotation: jax.Array, matrix_dot: jax.Array, *, damping: float = 0.0, order: int = 0
 ) -> jax.Array:
     """The tangent Ṙ = R[ω]× of the nearest rotation, for three arrays (..., 3, 3); see `angular_tangent`."""
-    r = _mat3.components(rotation)
-    omega = angular_tangent(_mat3.components(matrix), r, _mat3.components(matrix_dot), damping=damping, order=order)
-    return _mat3.stack(_mat3.multiply(r, _mat3.skew(omega)))
+    r = mat3.components(rotation)
+    omega = angular_tangent(mat3.components(matrix), r, mat3.components(matrix_dot), damping=damping, order=order)
+    return mat3.stack(mat3.multiply(r, mat3.skew(omega)))
 
 
 def angular_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, damping: float = 0.0, order: int = 0) -> Vec3:
@@ -42,14 +42,14 @@ def angular_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, damping: 
         matrix_dot: Ȧ.
         damping: δ/tr S where that is more than the 64 eps that are always there.
         order: How many derivatives have been taken before this one. It only decides where saturation begins, see
-            `_saturation.gain`.
+            `overflow.saturate`.
 
     Returns:
         ω on components. Finite for every finite A, and its derivatives too.
     """
-    torque = _mat3.axial(_mat3.transpose_multiply(rotation, matrix_dot))
+    torque = mat3.axial(mat3.transpose_multiply(rotation, matrix_dot))
     gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
-    return scaled_response(functools.partial(_mat3.apply, gaps.inverse), torque, gain(gaps.factor, gaps.norm, order))
+    return apply_scaled(functools.partial(mat3.apply, gaps.inverse), torque, saturate(gaps.factor, gaps.norm, order))
 
 
 def stretch_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, order: int = 0) -> Mat3:
@@ -57,17 +57,17 @@ def stretch_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, order: in
 
     It does not depend on the scale of A, so that it is right at every scale: ω and S are those of the normalised A.
     """
-    along = _mat3.transpose_multiply(rotation, matrix_dot)
+    along = mat3.transpose_multiply(rotation, matrix_dot)
     gaps = _inverse_gaps(matrix, rotation, 0.0, order + 1)
-    omega = _mat3.apply(gaps.inverse, _mat3.axial(along))
-    turn = _mat3.multiply(_mat3.skew(omega), gaps.stretch)
-    return _mat3.symmetric(_mat3.subtract(along, turn))
+    omega = mat3.apply(gaps.inverse, mat3.axial(along))
+    turn = mat3.multiply(mat3.skew(omega), gaps.stretch)
+    return mat3.symmetric(mat3.subtract(along, turn))
 
 
 def inverse_gap_matrix(matrix: Mat3, rotation: Mat3, *, damping: float = 0.0) -> Mat3:
     """H⁻¹ on components, damped and saturated as in `angular_tangent`, whose arguments it takes."""
     gaps = _inverse_gaps(matrix, rotation, damping, 1)
-    return _mat3.scale(gaps.inverse, gain(gaps.factor, gaps.norm, 0))
+    return mat3.scale(gaps.inverse, saturate(gaps.factor, gaps.norm, 0))
 
 
 class _InverseGaps(NamedTuple):
@@ -82,10 +82,10 @@ class _InverseGaps(NamedTuple):
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3))
 def _inverse_gaps(matrix: Mat3, rotation: Mat3, damping: float, order: int) -> _InverseGaps:
-    """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `gain`."""
-    factor = factor_of(matrix)
-    stretch = _mat3.transpose_multiply(rotation, _mat3.scale(matrix, factor))
-    inverse = damped_inverse(_mat3.gap_matrix(stretch), resolved_gap(_mat3.trace(stretch), damping))
+    """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `saturate`."""
+    factor = normalising_factor(matrix)
+    stretch = mat3.transpose_multiply(rotation, mat3.scale(matrix, factor))
+    inverse = damped_inverse(mat3.gap_matrix(stretch), resolved_gap(mat3.trace(stretch), damping))
     return _InverseGaps(*inverse, stretch, factor)
 
 
@@ -96,23 +96,23 @@ def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
     stretch_dot = stretch_tangent(matrix, rotation, matrix_dot, order=order)
     # Half of the gain on either side of the product: reverse mode meets each factor first in one of its terms, and all
     # of the gain on one side comes too late for another.
-    scale = gain(gaps.factor, gaps.norm, order)
-    before, after = halves(scale)
-    halved_dot = _mat3.scale(stretch_dot, before)
+    scale = saturate(gaps.factor, gaps.norm, order)
+    before, after = split_scale(scale)
+    halved_dot = mat3.scale(stretch_dot, before)
     # δ is linear in |tr S|.
-    delta_dot = resolved_gap(jnp.ones_like(gaps.norm), damping) * _mat3.trace(halved_dot)
-    delta_dot = jnp.where(_mat3.trace(gaps.stretch) < 0, -delta_dot, delta_dot)
+    delta_dot = resolved_gap(jnp.ones_like(gaps.norm), damping) * mat3.trace(halved_dot)
+    delta_dot = jnp.where(mat3.trace(gaps.stretch) < 0, -delta_dot, delta_dot)
 
     # notation: with P − iQ for (H+iδ)⁻¹, X + iY = (Ḣ+iδ̇)(P−iQ), and the tangent is −(P−iQ)(X+iY).
-    h_dot = _mat3.gap_matrix(halved_dot)
-    x = _mat3.add(_mat3.multiply(h_dot, gaps.inverse), _mat3.scale(gaps.unresolved, delta_dot))
-    y = _mat3.subtract(_mat3.scale(gaps.inverse, delta_dot), _mat3.multiply(h_dot, gaps.unresolved))
-    p, q = _mat3.scale(gaps.inverse, after), _mat3.scale(gaps.unresolved, after)
+    h_dot = mat3.gap_matrix(halved_dot)
+    x = mat3.add(mat3.multiply(h_dot, gaps.inverse), mat3.scale(gaps.unresolved, delta_dot))
+    y = mat3.subtract(mat3.scale(gaps.inverse, delta_dot), mat3.multiply(h_dot, gaps.unresolved))
+    p, q = mat3.scale(gaps.inverse, after), mat3.scale(gaps.unresolved, after)
     tangent = _InverseGaps(
-        _mat3.symmetric(_mat3.scale(_mat3.add(_mat3.multiply(p, x), _mat3.multiply(q, y)), -1.0)),
-        _mat3.symmetric(_mat3.subtract(_mat3.multiply(p, y), _mat3.multiply(q, x))),
+        mat3.symmetric(mat3.scale(mat3.add(mat3.multiply(p, x), mat3.multiply(q, y)), -1.0)),
+        mat3.symmetric(mat3.subtract(mat3.multiply(p, y), mat3.multiply(q, x))),
         jnp.zeros_like(gaps.norm),
-        _mat3.scale(stretch_dot, scale),
+        mat3.scale(stretch_dot, scale),
         jnp.zeros_like(gaps.factor),
     )
     return gaps, tangent
@@ -153,7 +153,7 @@ def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, Mat3, jax.Array]:
         ((m00[part], -m01[part], m02[part]), (-m01[part], m11[part], -last[part]), (m02[part], -last[part], r2[part]))
         for part in (0, 1)
     )
-    return real, _mat3.scale(imaginary, -1.0), jnp.sqrt(largest)
+    return real, mat3.scale(imaginary, -1.0), jnp.sqrt(largest)
 
 
 def resolved_gap(total: jax.Array, damping: float = 0.0) -> jax.Array:

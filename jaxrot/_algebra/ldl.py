@@ -6,7 +6,7 @@ unknowns end in quotients: what is rounding in one of them is then the same roun
 
 import jax.numpy as jnp
 
-from jaxrot._mat3 import Mat3, Vec3
+from jaxrot._algebra.mat3 import Mat3, Vec3
 
 
 def solve(h: Mat3, v: Vec3) -> Vec3:

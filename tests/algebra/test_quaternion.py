@@ -7,7 +7,8 @@ import pytest
 from certificate import assert_within, family_batch
 from differences import POINTS, assert_is_derivative, turned
 
-from jaxrot import _mat3, _quaternion, nearest_quaternion_wxyz, nearest_rotation
+from jaxrot import nearest_quaternion_wxyz, nearest_rotation
+from jaxrot._algebra import mat3, quaternion
 
 RANDOM = np.random.default_rng(0)
 UNIT = RANDOM.standard_normal((500, 4))
@@ -16,25 +17,25 @@ UNIT *= np.where(UNIT[:, :1] < 0, -1, 1)
 
 
 def to_matrix(quaternions):
-    return np.asarray(_mat3.stack(_quaternion.to_rotation(_quaternion.components(jnp.asarray(quaternions)))))
+    return np.asarray(mat3.stack(quaternion.to_rotation(quaternion.components(jnp.asarray(quaternions)))))
 
 
 def from_matrix(matrices):
-    return np.asarray(_quaternion.stack(_quaternion.from_rotation(_mat3.components(jnp.asarray(matrices)))))
+    return np.asarray(quaternion.stack(quaternion.from_rotation(mat3.components(jnp.asarray(matrices)))))
 
 
 def exponential(vectors):
     vectors = jnp.asarray(vectors)
-    return _quaternion.stack(_quaternion.exponential((vectors[..., 0], vectors[..., 1], vectors[..., 2])))
+    return quaternion.stack(quaternion.exponential((vectors[..., 0], vectors[..., 1], vectors[..., 2])))
 
 
 def logarithm(quaternions):
-    return jnp.stack(_quaternion.logarithm(_quaternion.components(jnp.asarray(quaternions))), axis=-1)
+    return jnp.stack(quaternion.logarithm(quaternion.components(jnp.asarray(quaternions))), axis=-1)
 
 
 def test_the_product_is_that_of_the_rotations():
     p, q = UNIT[:250], UNIT[250:]
-    product = _quaternion.stack(_quaternion.product(_quaternion.components(p), _quaternion.components(q)))
+    product = quaternion.stack(quaternion.product(quaternion.components(p), quaternion.components(q)))
     np.testing.assert_allclose(to_matrix(product), to_matrix(p) @ to_matrix(q), atol=4e-15)
 
 
@@ -129,7 +130,7 @@ def test_the_logarithm_has_finite_and_right_derivatives_to_second_order(quaterni
 
 def test_conversion_from_a_matrix_has_finite_derivatives_at_half_turns():
     for diagonal in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)):
-        jacobian = jax.jacrev(lambda m: _quaternion.stack(_quaternion.from_rotation(_mat3.components(m))))(
+        jacobian = jax.jacrev(lambda m: quaternion.stack(quaternion.from_rotation(mat3.components(m))))(
             np.diag(np.array(diagonal, float))
         )
         assert np.isfinite(jacobian).all()

@@ -1,34 +1,8 @@
-"""Choices, and what is rounding, made once for everything that hangs on them.
-
-XLA:CPU computes what is cheap again in every fusion, with products and sums contracted differently. Where a number is 0
-but for rounding, one component of a result could then follow one branch and its neighbour the other: no rotation, or a
-wrong one. What is divided it computes once.
-"""
-
-from typing import TypeVar
+"""Selection without branches."""
 
 import jax
 import jax.numpy as jnp
 from jax import lax
-
-from jaxrot._platform import platform
-
-_Tree = TypeVar("_Tree")
-
-
-def computed_once(values: _Tree, divisor: jax.Array | None = None) -> _Tree:
-    """The values, one array or several, over a divisor.
-
-    XLA:CPU stores quotients and computes everything else again where it is used. Where there is no divisor, a CPU
-    divides by a 1 that XLA does not see through. Other platforms compute the values of a kernel once: there the values
-    without a divisor stay as they are, and one reciprocal serves all of them.
-    """
-    if platform() != "cpu":
-        inverse = None if divisor is None else 1 / divisor
-        return values if inverse is None else jax.tree.map(lambda value: value * inverse, values)
-    if divisor is None:
-        divisor = constant_like(jax.tree.leaves(values)[0], 1)
-    return jax.tree.map(lambda value: value / divisor, values)
 
 
 def is_positive(x: jax.Array) -> jax.Array:

@@ -7,15 +7,15 @@ import jax.numpy as jnp
 from jax import lax
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3
-from jaxrot._choice import exchange
+from jaxrot._algebra import mat3
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_divide
+from jaxrot._algebra.select import exchange
 from jaxrot._compiled import compiled, exportable
-from jaxrot._derivative import inverse_gap_matrix, stretch_tangent
+from jaxrot._derivative.overflow import normalising_factor, saturate
+from jaxrot._derivative.rule import inverse_gap_matrix, stretch_tangent
 from jaxrot._inputs import check_choice, check_damping, check_flag, check_matrix
-from jaxrot._mat3 import Mat3, Vec3
 from jaxrot._nearest import nearest
-from jaxrot._saturation import factor_of, gain
-from jaxrot._scaling import safe_divide
 from jaxrot._svd import decomposed, reciprocal_gaps
 from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
@@ -69,8 +69,8 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
 def _rotation_jacobian(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
     # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
     rotation = nearest(matrix, method, damping, 1)
-    r = _mat3.components(rotation)
-    return _quadratic_form(r, inverse_gap_matrix(_mat3.components(matrix), r, damping=damping))
+    r = mat3.components(rotation)
+    return _quadratic_form(r, inverse_gap_matrix(mat3.components(matrix), r, damping=damping))
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
@@ -101,13 +101,13 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
 @compiled
 def _twist_modes(matrix: jax.Array) -> TwistModes:
     left, s, normalised, right = decomposed(matrix, 1)
-    u, v = _mat3.components(left), _mat3.components(right)
-    factor = factor_of(_mat3.components(matrix))
+    u, v = mat3.components(left), mat3.components(right)
+    factor = normalising_factor(mat3.components(matrix))
     gaps = reciprocal_gaps(s, normalised, factor, 1)
-    eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * gain(factor, gaps.norm, 0)[..., None]
-    axes = _mat3.identity_like(u)
-    modes = [_mat3.multiply(u, _mat3.multiply(_mat3.skew(axis), _mat3.transpose(v))) for axis in axes]
-    stacked = jnp.stack([_mat3.stack(_mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)
+    eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * saturate(factor, gaps.norm, 0)[..., None]
+    axes = mat3.identity_like(u)
+    modes = [mat3.multiply(u, mat3.multiply(mat3.skew(axis), mat3.transpose(v))) for axis in axes]
+    stacked = jnp.stack([mat3.stack(mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)
     return TwistModes(eigenvalues, stacked)
 
 
@@ -142,8 +142,8 @@ def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
 
 @compiled
 def _arap_hessian(matrix: jax.Array, *, psd: bool) -> jax.Array:
-    r = _mat3.components(nearest(matrix, DEFAULT_METHOD, 0.0, 1))
-    inverse = _mat3.components(_clamped(matrix)) if psd else inverse_gap_matrix(_mat3.components(matrix), r)
+    r = mat3.components(nearest(matrix, DEFAULT_METHOD, 0.0, 1))
+    inverse = mat3.components(_clamped(matrix)) if psd else inverse_gap_matrix(mat3.components(matrix), r)
     jacobian = _quadratic_form(r, inverse)
     return 2 * (jnp.broadcast_to(jnp.eye(9, dtype=jacobian.dtype), jacobian.shape) - jacobian)
 
@@ -155,7 +155,7 @@ def _clamped(matrix: jax.Array) -> jax.Array:
     φ(g) = 1/max(g, 2). Clamped, nothing is large: there is no gap to resolve.
     """
     _, s, _, right = decomposed(matrix, 1)
-    return _mat3.stack(_in_axes(right, _diagonal(_clamped_inverses(_gaps(s)))))
+    return mat3.stack(_in_axes(right, _diagonal(_clamped_inverses(_gaps(s)))))
 
 
 @_clamped.defjvp
@@ -164,13 +164,13 @@ def _clamped_jvp(primals, tangents):
     # and there that of V φ Vᵀ exists all the same.
     (matrix,), (matrix_dot,) = primals, tangents
     left, s, _, right = decomposed(matrix, 1)
-    v = _mat3.components(right)
-    rotation = _mat3.multiply(_mat3.components(left), _mat3.transpose(v))
-    stretch_dot = stretch_tangent(_mat3.components(matrix), rotation, _mat3.components(matrix_dot), order=1)
-    h_dot = _mat3.gap_matrix(_mat3.transpose_multiply(v, _mat3.multiply(stretch_dot, v)))
+    v = mat3.components(right)
+    rotation = mat3.multiply(mat3.components(left), mat3.transpose(v))
+    stretch_dot = stretch_tangent(mat3.components(matrix), rotation, mat3.components(matrix_dot), order=1)
+    h_dot = mat3.gap_matrix(mat3.transpose_multiply(v, mat3.multiply(stretch_dot, v)))
     gaps = _gaps(s)
-    tangent = [_mat3.multiply_entries(row, _slopes(gap, gaps)) for row, gap in zip(h_dot, gaps, strict=True)]
-    return _clamped(matrix), _mat3.stack(_in_axes(right, (tangent[0], tangent[1], tangent[2])))
+    tangent = [mat3.multiply_entries(row, _slopes(gap, gaps)) for row, gap in zip(h_dot, gaps, strict=True)]
+    return _clamped(matrix), mat3.stack(_in_axes(right, (tangent[0], tangent[1], tangent[2])))
 
 
 def _gaps(singular_values: jax.Array) -> Vec3:
@@ -212,8 +212,8 @@ def _diagonal(v: Vec3) -> Mat3:
 
 
 def _in_axes(axes: jax.Array, m: Mat3) -> Mat3:
-    v = _mat3.components(axes)
-    return _mat3.multiply(v, _mat3.multiply(m, _mat3.transpose(v)))
+    v = mat3.components(axes)
+    return mat3.multiply(v, mat3.multiply(m, mat3.transpose(v)))
 
 
 def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
@@ -221,8 +221,8 @@ def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
 
     By broadcasting, so that XLA writes the 81 entries in one pass and not in 81.
     """
-    t = jnp.concatenate([_mat3.stack(_mat3.skew(row)) for row in rotation], axis=-2)
-    product = _product(_product(t, _mat3.stack(_mat3.symmetric(m))), jnp.swapaxes(t, -1, -2))
+    t = jnp.concatenate([mat3.stack(mat3.skew(row)) for row in rotation], axis=-2)
+    product = _product(_product(t, mat3.stack(mat3.symmetric(m))), jnp.swapaxes(t, -1, -2))
     # (TM)Tᵀ and its transpose differ in rounding.
     return 0.5 * (product + jnp.swapaxes(product, -1, -2))
 

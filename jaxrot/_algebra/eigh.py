@@ -3,11 +3,12 @@
 import jax.numpy as jnp
 from jax import lax
 
-from jaxrot import _mat3
-from jaxrot._choice import computed_once, is_positive, sign_of
-from jaxrot._jacobi import diagonalising
-from jaxrot._mat3 import Mat3, Vec3
-from jaxrot._scaling import safe_divide, safe_sqrt
+from jaxrot._algebra import mat3
+from jaxrot._algebra.fusion import fusion_barrier
+from jaxrot._algebra.jacobi import diagonalising
+from jaxrot._algebra.mat3 import Mat3, Vec3
+from jaxrot._algebra.scaling import safe_divide, safe_sqrt
+from jaxrot._algebra.select import is_positive, sign_of
 
 # The largest root of the cubic is within 0.27 of 2, where Newton's method starts: after 4 steps it is off by 7e-12.
 _NEWTON_STEPS = 5
@@ -31,16 +32,16 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     Source: Eberly, "A robust eigensolver for 3×3 symmetric matrices", 2014, with Newton's method in the place of the
     trigonometric functions.
     """
-    mean = _mat3.trace(m) / 3
-    deviation = _mat3.add_to_diagonal(m, -mean)
+    mean = mat3.trace(m) / 3
+    deviation = mat3.add_to_diagonal(m, -mean)
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = deviation
     symmetric: Mat3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    size = safe_sqrt(_mat3.squared_norm(symmetric) / 6)
+    size = safe_sqrt(mat3.squared_norm(symmetric) / 6)
     # notation: x, the eigenvalues of the deviation over its size, between −2 and 2: x³ − 3x − 2p = 0.
     inverse = safe_divide(jnp.ones_like(size), size)
     xx, xy, xz, yy, yz, zz = (entry * inverse for entry in (xx, xy, xz, yy, yz, zz))
     scaled: Mat3 = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    p = _mat3.determinant(scaled) * 0.5
+    p = mat3.determinant(scaled) * 0.5
     largest_is_simple = is_positive(p)
     p = jnp.abs(p)
     p = jnp.where(p > 1, jnp.ones_like(p), p)
@@ -49,13 +50,13 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
         square = root * root
         root = 2 * (square * root + p) / (3 * square - 3)
     root = jnp.where(largest_is_simple, root, -root)
-    adjugate = _mat3.cofactor(_mat3.add_to_diagonal(scaled, -root))
+    adjugate = mat3.cofactor(mat3.add_to_diagonal(scaled, -root))
     sizes = [lax.stop_gradient(jnp.abs(adjugate[i][i])) for i in range(3)]
     simple, largest = adjugate[0], sizes[0]
     for i in (1, 2):
-        simple = _mat3.where(is_positive(sizes[i] - largest), adjugate[i], simple)
+        simple = mat3.where(is_positive(sizes[i] - largest), adjugate[i], simple)
         largest = jnp.maximum(largest, sizes[i])
-    length = safe_sqrt(_mat3.dot(simple, simple))
+    length = safe_sqrt(mat3.dot(simple, simple))
     x, y, z = (component / length for component in simple)
 
     # Two perpendicular axes; the sign keeps the denominator away from 0 (Duff et al. 2017).
@@ -63,15 +64,15 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     quotient = -1 / (sign + z)
     u: Vec3 = (1 + sign * x * x * quotient, sign * x * y * quotient, -sign * x)
     v: Vec3 = (x * y * quotient, sign + y * y * quotient, -y)
-    hu, hv = _mat3.apply(scaled, u), _mat3.apply(scaled, v)
-    uu, uv, vv = _mat3.dot(u, hu), _mat3.dot(u, hv), _mat3.dot(v, hv)
+    hu, hv = mat3.apply(scaled, u), mat3.apply(scaled, v)
+    uu, uv, vv = mat3.dot(u, hu), mat3.dot(u, hv), mat3.dot(v, hv)
     # Once: what is rounding here decides which of two axes comes first, for their components and for their eigenvalues.
-    uu, uv, vv = computed_once((uu, uv, vv))
+    uu, uv, vv = fusion_barrier((uu, uv, vv))
     (cosine, sine), t = diagonalising(uu, uv, vv)
     first_is_smaller = is_positive((vv - t * uv) - (uu + t * uv))
-    larger = _mat3.add_vectors(
-        _mat3.scale_vector(u, jnp.where(first_is_smaller, -sine, cosine)),
-        _mat3.scale_vector(v, jnp.where(first_is_smaller, cosine, sine)),
+    larger = mat3.add_vectors(
+        mat3.scale_vector(u, jnp.where(first_is_smaller, -sine, cosine)),
+        mat3.scale_vector(v, jnp.where(first_is_smaller, cosine, sine)),
     )
     # Without t, whose sign is arbitrary where uu = vv: two parts of a program that round it differently would give the
     # larger eigenvalue twice.
@@ -79,12 +80,12 @@ def eigen(m: Mat3) -> tuple[Vec3, Mat3]:
     larger_value, smaller_value = middle + radius, middle - radius
 
     axis: Vec3 = (x, y, z)
-    axis0 = _mat3.where(largest_is_simple, axis, larger)
-    axis1 = _mat3.where(largest_is_simple, larger, _mat3.cross(axis, larger))
+    axis0 = mat3.where(largest_is_simple, axis, larger)
+    axis1 = mat3.where(largest_is_simple, larger, mat3.cross(axis, larger))
     values = (
         jnp.where(largest_is_simple, root, larger_value),
         jnp.where(largest_is_simple, larger_value, smaller_value),
         jnp.where(largest_is_simple, smaller_value, root),
     )
-    axes = (axis0, axis1, _mat3.cross(axis0, axis1))
-    return _mat3.add_vectors(_mat3.scale_vector(values, size), (mean, mean, mean)), axes
+    axes = (axis0, axis1, mat3.cross(axis0, axis1))
+    return mat3.add_vectors(mat3.scale_vector(values, size), (mean, mean, mean)), axes

@@ -5,11 +5,11 @@ import functools
 import jax
 from jax.typing import ArrayLike
 
-from jaxrot import _mat3
+from jaxrot._algebra import mat3
+from jaxrot._algebra.scaling import safe_divide
 from jaxrot._compiled import compiled
+from jaxrot._derivative.overflow import normalising_factor, saturate
 from jaxrot._inputs import check_matrix
-from jaxrot._saturation import factor_of, gain
-from jaxrot._scaling import safe_divide
 from jaxrot._svd import decomposed, reciprocal_gaps, tangent_in_axes
 
 
@@ -47,7 +47,7 @@ def _rotation_gap(matrix: jax.Array) -> jax.Array:
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
 def _gap(matrix: jax.Array, order: int) -> jax.Array:
-    """The gap; `order` counts the derivatives taken, see `_saturation.gain`."""
+    """The gap; `order` counts the derivatives taken, see `overflow.saturate`."""
     _, _, s, _ = decomposed(matrix, order)
     return safe_divide(s[..., 1] + s[..., 2], s[..., 0])
 
@@ -58,6 +58,6 @@ def _gap_jvp(order: int, primals, tangents):
     gap = _gap(matrix, order + 1)
     left, s, normalised, right = decomposed(matrix, order + 1)
     m = tangent_in_axes(left, matrix_dot, right)
-    factor = factor_of(_mat3.components(matrix))
+    factor = normalising_factor(mat3.components(matrix))
     norm = reciprocal_gaps(s, normalised, factor, order + 1).norm
-    return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], normalised[..., 0]) * gain(factor, norm, order)
+    return gap, safe_divide(m[1][1] + m[2][2] - gap * m[0][0], normalised[..., 0]) * saturate(factor, norm, order)
