@@ -1,5 +1,8 @@
 """jaxrot: the rotation in a 3×3 matrix, in batches, differentiable to any order, right for every finite input."""
 
+import importlib
+from typing import TYPE_CHECKING
+
 from jaxrot import _startup as _startup  # the first: it handles Ctrl-C while the rest is imported
 from jaxrot import families as families
 from jaxrot._blocks import in_blocks as in_blocks
@@ -14,8 +17,6 @@ from jaxrot._nearest import nearest_quaternion_wxyz as nearest_quaternion_wxyz
 from jaxrot._nearest import nearest_rotation as nearest_rotation
 from jaxrot._polar import PolarDecomposition as PolarDecomposition
 from jaxrot._polar import polar_decomposition as polar_decomposition
-from jaxrot._recommend import recommend as recommend
-from jaxrot._recommendation import Recommendation as Recommendation
 from jaxrot._refine import refine_quaternion_wxyz as refine_quaternion_wxyz
 from jaxrot._refine import refine_rotation as refine_rotation
 from jaxrot._svd import RotationVariantSVD as RotationVariantSVD
@@ -26,6 +27,10 @@ from jaxrot.solvers import METHODS as METHODS
 from jaxrot.solvers import Method as Method
 from jaxrot.steps import STEPS as STEPS
 from jaxrot.steps import Step as Step
+
+if TYPE_CHECKING:
+    from jaxrot._recommend.recommend import recommend as recommend
+    from jaxrot._recommend.result import Recommendation as Recommendation
 
 __version__ = "0.1.0"
 
@@ -56,3 +61,13 @@ __all__ = [
     "signed_singular_values",
     "twist_modes",
 ]
+
+# What measures is loaded when it is asked for.
+_LAZY = {"Recommendation": "jaxrot._recommend.result", "recommend": "jaxrot._recommend.recommend"}
+
+
+def __getattr__(name: str) -> object:
+    """A public name that is imported on first use."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_LAZY[name]), name)

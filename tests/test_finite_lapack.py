@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot import _candidates, _recommend, families
+from jaxrot import families
 from jaxrot.__main__ import main
+from jaxrot._recommend import candidates
+from jaxrot._recommend import recommend as recommend_module
 from jaxrot.measuring.judging import judge
 from jaxrot.report import beside
 from jaxrot.report.inputs import read_input
@@ -56,12 +58,12 @@ def test_the_assertion_fires():
 @pytest.fixture
 def one_method(monkeypatch):
     # `svd` and `davenport` call LAPACK too; their guard is the solvers' own.
-    monkeypatch.setattr(_recommend, "METHODS", {jaxrot.DEFAULT_METHOD: jaxrot.METHODS[jaxrot.DEFAULT_METHOD]})
-    monkeypatch.setattr(_candidates, "TIMING_BUDGET_S", 0.02)
+    monkeypatch.setattr(recommend_module, "METHODS", {jaxrot.DEFAULT_METHOD: jaxrot.METHODS[jaxrot.DEFAULT_METHOD]})
+    monkeypatch.setattr(candidates, "TIMING_BUDGET_S", 0.02)
 
 
 def test_recommend_leaves_out_what_is_not_finite(one_method, monkeypatch):
-    monkeypatch.setattr(_recommend, "STEPS", {})
+    monkeypatch.setattr(recommend_module, "STEPS", {})
     starts = families.poison(np.broadcast_to(np.eye(3, dtype=np.float32), (9, 3, 3)), seed=1)
     starts = np.roll(starts, 1, axis=0)
     found = jaxrot.recommend(NOT_FINITE, tolerance=1e-3, previous=starts)

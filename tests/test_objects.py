@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot import METHODS, STEPS, _candidates, in_blocks, nearest_rotation
+from jaxrot import METHODS, STEPS, in_blocks, nearest_rotation
+from jaxrot._recommend import candidates
 from jaxrot.scenes import drift
 
 A = np.random.default_rng(0).standard_normal((4, 3, 3)).astype(np.float32)
@@ -18,8 +19,8 @@ A = np.random.default_rng(0).standard_normal((4, 3, 3)).astype(np.float32)
 @pytest.fixture(scope="module")
 def recommendation():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_candidates, "TIMING_BUDGET_S", 0.02)
-        patch.setattr("jaxrot._recommend.METHODS", {name: METHODS[name] for name in ("squaring", "foam")})
+        patch.setattr(candidates, "TIMING_BUDGET_S", 0.02)
+        patch.setattr("jaxrot._recommend.recommend.METHODS", {name: METHODS[name] for name in ("squaring", "foam")})
         return jaxrot.recommend(A, tolerance=1e-3)
 
 

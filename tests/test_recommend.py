@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot import DEFAULT_METHOD, METHODS, STEPS, _candidates, _recommend, _sample, recommend
-from jaxrot._candidates import outside_domain, start_outside_domain
-from jaxrot._sample import take_sample
+from jaxrot import DEFAULT_METHOD, METHODS, STEPS, recommend
+from jaxrot._recommend import candidates
+from jaxrot._recommend import recommend as recommend_module
+from jaxrot._recommend import sample as sample_module
+from jaxrot._recommend.candidates import outside_domain, start_outside_domain
+from jaxrot._recommend.sample import take_sample
 from jaxrot.families import FAMILIES
 from jaxrot.measuring import reference
 from jaxrot.measuring.timing import Timing
@@ -34,7 +37,7 @@ def fake_times(compiled, matrices, batch, *, budget_s, starts=None):
 @pytest.fixture(scope="module")
 def patch():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_candidates, "time_methods", fake_times)
+        patch.setattr(candidates, "time_methods", fake_times)
         yield patch
 
 
@@ -56,7 +59,7 @@ def stretched(s, count=50):
 def on_noise(patch):
     methods = {name: method for name, method in METHODS.items() if name not in SLOW_TO_COMPILE}
     with pytest.MonkeyPatch.context() as own:
-        own.setattr(_recommend, "METHODS", methods)
+        own.setattr(recommend_module, "METHODS", methods)
         return recommend(noisy(500, 0.01), tolerance=1e-2)
 
 
@@ -155,8 +158,8 @@ def test_the_reasons_name_the_numbers():
 
 
 def test_the_domain_is_asked_of_all_matrices_and_the_extremes_are_in_the_sample(monkeypatch):
-    monkeypatch.setattr(_sample, "MOST_MATRICES", 20)
-    monkeypatch.setattr(_sample, "EXTREMES", 1)
+    monkeypatch.setattr(sample_module, "MOST_MATRICES", 20)
+    monkeypatch.setattr(sample_module, "EXTREMES", 1)
     matrices = np.concatenate([noisy(500, 0.01), stretched((1, 0.05, 0.05), 1), stretched((1, 1, -0.5), 2)])
     sample = take_sample(matrices[np.random.default_rng(0).permutation(503)], None, None)
     assert (sample.given, sample.finite, sample.not_upright, len(sample.judged.matrices)) == (503, 503, 2, 20)
@@ -181,10 +184,10 @@ def test_a_tolerance_that_nothing_meets_gets_the_best_and_says_so(patch, inverte
 
 def test_the_spread_of_times_decides_nothing_and_the_error_does():
     def candidate(name, error, ns):
-        return _candidates.Candidate(name, name, None, None, error, ns, (0.9 * ns, 1.1 * ns))
+        return candidates.Candidate(name, name, None, None, error, ns, (0.9 * ns, 1.1 * ns))
 
     fastest, tied, slow = candidate("a", 3.0, 10.0), candidate("b", 2.0, 11.0), candidate("c", 1.0, 20.0)
-    assert _recommend._cheapest([fastest, tied, slow]) is tied
+    assert recommend_module._cheapest([fastest, tied, slow]) is tied
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +204,7 @@ def frames():
 def few_methods(patch):
     methods = {name: METHODS[name] for name in (DEFAULT_METHOD, "taylor")}
     with pytest.MonkeyPatch.context() as own:
-        own.setattr(_recommend, "METHODS", methods)
+        own.setattr(recommend_module, "METHODS", methods)
         yield
 
 
@@ -261,24 +264,24 @@ def test_the_function_is_for_jit_vmap_and_grad(on_noise):
 def test_where_no_error_is_defined_a_wrong_rotation_counts(patch):
     """At rank 1 and at 0 the nearest rotation is not unique."""
     sample = take_sample(np.concatenate([stretched((1, 0, 0), 5), np.zeros((1, 3, 3), np.float32)]), None, None)
-    assert _candidates.undetermined(sample) >= 1
+    assert candidates.undetermined(sample) >= 1
     right = sample.judged.solution.rotation.astype(np.float32)
     where = sample.judged.condition > 1e9
-    assert _candidates.error_on(right, sample.judged) < 1e-2
+    assert candidates.error_on(right, sample.judged) < 1e-2
     for wrong in (1.5 * right, right @ np.diag([1, 1, -1]).astype(np.float32), np.nan * right):
         spoiled = np.where(where[:, None, None], wrong, right)
-        assert _candidates.error_on(spoiled, sample.judged) > 0.5
+        assert candidates.error_on(spoiled, sample.judged) > 0.5
 
 
 def test_times_are_measured_on_this_machine(inverted, monkeypatch):
-    monkeypatch.setattr(_candidates, "TIMING_BUDGET_S", 0.1)
-    monkeypatch.setattr(_recommend, "METHODS", {DEFAULT_METHOD: METHODS[DEFAULT_METHOD]})
+    monkeypatch.setattr(candidates, "TIMING_BUDGET_S", 0.1)
+    monkeypatch.setattr(recommend_module, "METHODS", {DEFAULT_METHOD: METHODS[DEFAULT_METHOD]})
     with pytest.MonkeyPatch.context() as own:
-        own.setattr(_candidates, "time_methods", jaxrot.measuring.timing.time_methods)
+        own.setattr(candidates, "time_methods", jaxrot.measuring.timing.time_methods)
         result = recommend(inverted, tolerance=1e-2)
     low, high = result.time_quartiles_ns
     assert 0 < low <= result.time_ns <= high < 1e5
-    assert result.batch == _candidates.SMALLEST_BATCH
+    assert result.batch == candidates.SMALLEST_BATCH
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,6 @@ def nonzero_sqrt(square: jax.Array, smallest: float | None = None) -> jax.Array:
     It serves as a divisor: 0 over it is 0, with a finite derivative. `smallest` is the smallest normal number unless it
     is given.
     """
-    smallest = jnp.finfo(square.dtype).tiny if smallest is None else smallest
-    bound = jnp.full_like(square, smallest)
+    bound = jnp.full_like(square, float(jnp.finfo(square.dtype).tiny) if smallest is None else smallest)
     # A maximum would not do: on a mesh with Explicit axes jax 0.10 cannot differentiate it.
     return jnp.sqrt(jnp.where(square <= bound, bound, square))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from jaxrot import Recommendation
-from jaxrot._candidates import Candidate
-from jaxrot._recommend import number_of_steps, recommend_step_by_step
+from jaxrot._recommend.candidates import Candidate
+from jaxrot._recommend.recommend import number_of_steps, recommend_step_by_step
 from jaxrot.console.arguments import path
 from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxrot import _candidates
 from jaxrot.__main__ import main
+from jaxrot._recommend import candidates
 from jaxrot.console.interrupts import Interrupts, watched
 from jaxrot.report import command as report
 from jaxrot.report import measurement, sections
@@ -56,7 +56,7 @@ def _swallowed(*arguments, **options):
 def test_measuring_is_interrupted_in_one_line(command, interrupt, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("own.npy", np.ones((4, 3, 3), np.float32))
-    monkeypatch.setattr(_candidates, "compile_method", interrupt)
+    monkeypatch.setattr(candidates, "compile_method", interrupt)
     monkeypatch.setattr(report, "measure", interrupt)
     monkeypatch.setattr(report.bench, "run_bench", interrupt)
     monkeypatch.setattr(simulate, "SCENES", {"falling": Entry(interrupt, None, "")})

@@ -5,16 +5,20 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot import DEFAULT_METHOD, METHODS, _candidates, _recommend
+from jaxrot import DEFAULT_METHOD, METHODS
 from jaxrot.__main__ import main
+from jaxrot._recommend import candidates
+from jaxrot._recommend import recommend as recommend_module
 from jaxrot.families import FAMILIES
 
 
 @pytest.fixture(autouse=True)
 def few_methods(monkeypatch):
     """Compiling is what takes time: three methods, one of which inverted matrices leave out."""
-    monkeypatch.setattr(_recommend, "METHODS", {name: METHODS[name] for name in (DEFAULT_METHOD, "taylor", "svd")})
-    monkeypatch.setattr(_candidates, "TIMING_BUDGET_S", 0.05)
+    monkeypatch.setattr(
+        recommend_module, "METHODS", {name: METHODS[name] for name in (DEFAULT_METHOD, "taylor", "svd")}
+    )
+    monkeypatch.setattr(candidates, "TIMING_BUDGET_S", 0.05)
 
 
 @pytest.fixture
@@ -49,8 +53,8 @@ def test_a_tolerance_that_nothing_meets_is_said_so(tmp_path, inverted, capsys):
 
 
 def test_previous_rotations_are_read_by_name(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(_recommend, "STEPS", {"newton": jaxrot.STEPS["newton"]})
-    monkeypatch.setattr(_candidates, "time_methods", _steps_first)
+    monkeypatch.setattr(recommend_module, "STEPS", {"newton": jaxrot.STEPS["newton"]})
+    monkeypatch.setattr(candidates, "time_methods", _steps_first)
     rotations = FAMILIES["rotation"].sample(6, dtype=np.float32).matrices
     matrices = rotations @ np.diag([1, 0.5, -0.2]).astype(np.float32)
     np.savez(tmp_path / "now.npz", a=matrices[:4], b=matrices[4:])
@@ -117,7 +121,7 @@ def _refused(words, capsys):
     ],
 )
 def test_a_mistake_is_refused_in_one_line(words, expected, tmp_path, inverted, capsys, monkeypatch):
-    monkeypatch.setattr(_candidates, "compile_method", lambda *arguments, **options: pytest.fail("measured"))
+    monkeypatch.setattr(candidates, "compile_method", lambda *arguments, **options: pytest.fail("measured"))
     np.save(tmp_path / "flat.npy", np.ones((3, 5)))
     np.save(tmp_path / "nan.npy", np.full((2, 3, 3), np.nan))
     np.savez(tmp_path / "ab.npz", a=np.eye(3), b=np.eye(3))

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxrot import STEPS, _refine
+from jaxrot import STEPS, _refine, nearest_rotation
 from jaxrot.families import FAMILIES
 from jaxrot.measuring.judging import judge
 from jaxrot.report.guards import default_method

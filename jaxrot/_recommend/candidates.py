@@ -11,8 +11,8 @@ from jax.typing import ArrayLike
 
 from jaxrot._inputs import check_matrix, check_start
 from jaxrot._nearest import nearest_rotation
+from jaxrot._recommend.sample import Sample
 from jaxrot._refine import refine_rotation
-from jaxrot._sample import Sample
 from jaxrot.measuring import domain, reference
 from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
 from jaxrot.measuring.judging import Judged

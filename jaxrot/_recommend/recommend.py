@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from jax.typing import ArrayLike, DTypeLike
 
-from jaxrot import _candidates
-from jaxrot._candidates import Candidate, Measured
 from jaxrot._frozen import FrozenMapping
-from jaxrot._recommendation import Recommendation
-from jaxrot._sample import Sample, take_sample
+from jaxrot._recommend import candidates
+from jaxrot._recommend.candidates import Candidate, Measured
+from jaxrot._recommend.result import Recommendation
+from jaxrot._recommend.sample import Sample, take_sample
 from jaxrot.solvers import METHODS
 from jaxrot.steps import STEPS
 
@@ -82,7 +82,7 @@ def recommend_step_by_step(
         (entry for entry in measured if entry.candidate.error > allowed), key=lambda entry: entry.candidate.error
     )
     advance("timing")
-    timed = _candidates.time_candidates(meeting or failing[:1], sample)
+    timed = candidates.time_candidates(meeting or failing[:1], sample)
     chosen = _cheapest(timed)
     errors = [entry.candidate for entry in failing if entry.candidate.name != chosen.name]
     judged = sample.judged
@@ -91,7 +91,7 @@ def recommend_step_by_step(
         method=chosen.method,
         step=chosen.step,
         iterations=chosen.iterations,
-        apply=_candidates.apply_of(chosen, takes_previous=sample.starts is not None),
+        apply=candidates.apply_of(chosen, takes_previous=sample.starts is not None),
         meets=bool(meeting),
         error=chosen.error,
         time_ns=chosen.time_ns,
@@ -99,11 +99,11 @@ def recommend_step_by_step(
         tolerance=tolerance,
         margin=MARGIN,
         dtype=sample.dtype,
-        batch=_candidates.batch_size(sample),
+        batch=candidates.batch_size(sample),
         sample=len(judged.matrices),
         given=sample.given,
         not_finite=sample.not_finite,
-        undetermined=_candidates.undetermined(sample),
+        undetermined=candidates.undetermined(sample),
         runners_up=tuple(candidate for candidate in timed if candidate.name != chosen.name),
         too_inaccurate=tuple(errors),
         excluded=FrozenMapping(excluded),
@@ -120,17 +120,17 @@ def _measure_all(
 ) -> tuple[list[Measured], dict[str, str]]:
     measured, excluded = [], {}
     for name, method in METHODS.items():
-        if (reason := _candidates.outside_domain(method, sample)) is not None:
+        if (reason := candidates.outside_domain(method, sample)) is not None:
             excluded[name] = reason
             continue
         advance(f"measuring {name}")
-        measured.append(_candidates.measure_method(name, sample))
+        measured.append(candidates.measure_method(name, sample))
     for name in STEPS if sample.starts is not None else ():
-        if (reason := _candidates.start_outside_domain(name, sample)) is not None:
+        if (reason := candidates.start_outside_domain(name, sample)) is not None:
             excluded[_step_name(name)] = reason
             continue
         advance(f"measuring {name} steps")
-        measured.append(_candidates.measure_step(name, sample, allowed))
+        measured.append(candidates.measure_step(name, sample, allowed))
     return measured, excluded
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import jax
 
-from jaxrot._candidates import Candidate
+from jaxrot._recommend.candidates import Candidate
 from jaxrot.measuring.words import listed, number
 from jaxrot.solvers import DEFAULT_METHOD
 

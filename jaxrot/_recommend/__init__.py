@@ -1,0 +1,1 @@
+"""`recommend`: the sample, the candidates, and the result."""
