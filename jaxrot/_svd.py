@@ -142,8 +142,8 @@ def _decomposed_jvp(order: int, primals, tangents):
     mirrored = (m[2][1] + m[1][2], m[0][2] + m[2][0], m[1][0] + m[0][1])
     w = apply_scaled(functools.partial(mat3.multiply_entries, gaps.over_sums), mat3.axial(m), scale)
     p = apply_scaled(functools.partial(mat3.multiply_entries, gaps.over_differences), mirrored, scale)
-    left_dot = _turned(left, mat3.scale_vector(mat3.add_vectors(p, w), 0.5))
-    right_dot = _turned(right, mat3.scale_vector(mat3.add_vectors(p, mat3.scale_vector(w, -1.0)), 0.5))
+    left_dot = _axes_tangent(left, mat3.scale_vector(mat3.add_vectors(p, w), 0.5))
+    right_dot = _axes_tangent(right, mat3.scale_vector(mat3.add_vectors(p, mat3.scale_vector(w, -1.0)), 0.5))
     normalised_dot = s_dot * saturate(factor, gaps.norm, order + 1)[..., None]
     return (left, s, normalised, right), (left_dot, s_dot, normalised_dot, right_dot)
 
@@ -225,5 +225,5 @@ def _real_parts(numbers: tuple[Complex, ...]) -> Vec3:
     return x, y, z
 
 
-def _turned(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
+def _axes_tangent(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
     return mat3.stack(mat3.multiply(mat3.components(axes), mat3.skew(angular_velocity)))

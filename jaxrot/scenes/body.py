@@ -12,7 +12,8 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jaxrot._compiled import exportable
-from jaxrot.scenes.clusters import incidence, padded, two_scale_clusters
+from jaxrot.scenes.clusters import padded, two_scale_clusters
+from jaxrot.scenes.incidence import incidence
 from jaxrot.scenes.scene import LARGEST_COORDINATE
 
 
@@ -68,7 +69,7 @@ def build_body(
             f"masses must be {len(vertices)} positive finite numbers; got shape {mass.shape}{_worst(mass)}"
         )
     members, filled = padded(clusters, len(vertices))
-    places, counts = incidence(members, filled, len(vertices))
+    places, counts = incidence(members, len(vertices), filled=filled)
     shares = np.where(filled, (mass / counts)[members], 0.0)
     shares /= shares.sum(axis=1, keepdims=True)
     centres = np.einsum("cs,csi->ci", shares, vertices[members])

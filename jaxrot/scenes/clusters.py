@@ -117,33 +117,6 @@ def padded(
     return members, filled
 
 
-def incidence(members: np.ndarray, filled: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The table the other way round: every place of every vertex, so that sums over clusters are gathers.
-
-    Args:
-        members: Shape (c, s).
-        filled: Which of its places are filled, shape (c, s).
-        vertex_count: How many vertices there are, n.
-
-    Returns:
-        Places as indices into the c·s of `members`, shape (n, k), c·s where a vertex has no more; and how many each
-        vertex has, shape (n,).
-
-    Raises:
-        ValueError: A vertex is in no cluster.
-    """
-    occupied = np.flatnonzero(filled.ravel())
-    vertex = members.ravel()[occupied]
-    counts = np.bincount(vertex, minlength=vertex_count)
-    if not counts.all():
-        raise ValueError(f"every vertex must be in a cluster; vertex {int(np.argmin(counts))} is in none")
-    order = np.argsort(vertex, kind="stable")
-    rank = np.arange(len(vertex)) - np.repeat(np.cumsum(counts) - counts, counts)
-    places = np.full((vertex_count, counts.max()), members.size, dtype=np.intp)
-    places[vertex[order], rank] = occupied[order]
-    return places, counts
-
-
 def _nearest_first(distance: np.ndarray, size: int) -> np.ndarray:
     nearest = np.argpartition(distance, size - 1)[:size]
     return nearest[np.argsort(distance[nearest], kind="stable")]

@@ -17,6 +17,7 @@ from jaxrot._compiled import exportable
 from jaxrot.scenes import elasticity
 from jaxrot.scenes import tetrahedra as meshes
 from jaxrot.scenes.elasticity import Elements
+from jaxrot.scenes.incidence import incidence
 from jaxrot.scenes.newton import Choices, Problem, minimise
 
 INTEGRATORS = ("euler", "midpoint")
@@ -111,7 +112,7 @@ def build(
     shear_modulus, lame_first = elasticity.lame_parameters(np.broadcast_to(young, (count,)), poisson)
     elements = Elements(
         corners=jnp.asarray(mesh.tetrahedra),
-        incidence=jnp.asarray(meshes.incidence(mesh)),
+        incidence=jnp.asarray(incidence(mesh.tetrahedra, len(mesh.vertices))[0]),
         rest_inverses=array(np.linalg.inv(meshes.edge_matrices(mesh))),
         volumes=array(meshes.volumes(mesh)),
         shear_modulus=array(shear_modulus),

@@ -88,7 +88,7 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
     alone = np.setdiff1d(np.arange(len(vertices)), tetrahedra)
     if len(alone):
         raise ValueError(f"vertex {alone[0]} belongs to no tetrahedron, it would have no mass")
-    mesh = _turned(Mesh(vertices.astype(np.float64), tetrahedra.astype(np.int32)))
+    mesh = _with_positive_volumes(Mesh(vertices.astype(np.float64), tetrahedra.astype(np.int32)))
     edges = edge_matrices(mesh)
     # Relative to the longest edge: a mesh in micrometres is no flatter than one in kilometres.
     flat = np.linalg.det(edges) <= 1e-9 * np.linalg.norm(edges, axis=-2).max(axis=-1) ** 3
@@ -97,7 +97,7 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
     return mesh
 
 
-def _turned(mesh: Mesh) -> Mesh:
+def _with_positive_volumes(mesh: Mesh) -> Mesh:
     negative = np.linalg.det(edge_matrices(mesh)) < 0
     swapped = mesh.tetrahedra[:, [0, 1, 3, 2]]
     return mesh._replace(tetrahedra=np.where(negative[:, None], swapped, mesh.tetrahedra))
@@ -118,21 +118,6 @@ def lumped_masses(mesh: Mesh, density: np.ndarray | float) -> np.ndarray:
     """A quarter of the mass of each tetrahedron to each of its corners: shape (n,), kg."""
     quarter = np.broadcast_to(density * volumes(mesh) / _CORNERS, (_CORNERS, len(mesh.tetrahedra)))
     return np.bincount(mesh.tetrahedra.T.ravel(), weights=quarter.ravel(), minlength=len(mesh.vertices))
-
-
-def incidence(mesh: Mesh) -> np.ndarray:
-    """Where each vertex occurs in `tetrahedra.ravel()`: shape (n, largest valence).
-
-    Rows are filled up with 4 m, the first index past the end. Forces are gathered through it: a scatter is slow on a
-    processor, and adds in an order that is not fixed on an accelerator.
-    """
-    corners = mesh.tetrahedra.ravel()
-    order = np.argsort(corners, kind="stable")
-    valence = np.bincount(corners, minlength=len(mesh.vertices))
-    column = np.arange(corners.size) - np.repeat(np.cumsum(valence) - valence, valence)
-    table = np.full((len(mesh.vertices), valence.max()), corners.size, dtype=np.int32)
-    table[corners[order], column] = order
-    return table
 
 
 def surface_edges(mesh: Mesh) -> np.ndarray:

@@ -20,7 +20,7 @@ def solve(a: Mat3) -> Mat3:
     for det A ≤ 0. The denominator is 2(s1+s2)(s2+s3)(s3+s1): where R is not unique the result is 0/0, returned as such.
 
     Returns:
-        (..., 3, 3). In float32 good to κ ≈ 10: the root loses digits as it becomes double.
+        In float32 good to κ ≈ 10: the root loses digits as it becomes double.
 
     Cost: about 150 flops and 14 (float32) or 28 (float64) Newton steps of 10.
     Source: Markley, "Attitude determination using vector observations: a fast optimal matrix algorithm", 1993; again,

@@ -13,7 +13,7 @@ def solve(a: Mat3) -> Mat3:
     For det A < 0 the formula gives the nearest *reflection*; for det A = 0 it divides by zero, NaN or infinity.
 
     Returns:
-        (..., 3, 3). The error grows like eps (s1/s3)²: λ3 is good to eps s1², and divided by.
+        The error grows like eps (s1/s3)²: λ3 is good to eps s1², and divided by.
 
     Cost: about 540 flops, 23 square roots and as many divisions.
     Source: Wessner 1966, in Müller et al. 2016, section 2; Sarabandi et al. 2020, eq. (2), (6) and (7), where V holds

@@ -20,7 +20,7 @@ def solve(a: Mat3) -> Mat3:
     two others; two or three zero, U = 1 and the result is Vᵀ, some rotation.
 
     Returns:
-        (..., 3, 3). The error grows like eps (s1/s3)², and so does the defect of orthogonality: s is good to eps s1²/s.
+        The error grows like eps (s1/s3)², and so does the defect of orthogonality: s is good to eps s1²/s.
         At rank 1 the result is a rotation and not a nearest one.
 
     Cost: about 560 flops, 24 square roots and as many divisions.

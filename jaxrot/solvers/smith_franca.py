@@ -14,7 +14,7 @@ def solve(a: Mat3) -> Mat3:
     formula gives the nearest *reflection*, for det A = 0 it divides by zero; both are returned as they are.
 
     Returns:
-        (..., 3, 3). In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are good to
+        In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are good to
         eps s1², and the small one is divided by.
 
     Cost: about 250 flops, three square roots, one arc tangent, a sine and a cosine.

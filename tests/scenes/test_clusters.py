@@ -3,8 +3,9 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from jaxrot.scenes.clusters import covering_clusters, incidence, overlapping_clusters, padded, spread_clusters
+from jaxrot.scenes.clusters import covering_clusters, overlapping_clusters, padded, spread_clusters
 from jaxrot.scenes.dragon import rest_vertices
+from jaxrot.scenes.incidence import incidence
 
 SIZE = 32
 
@@ -56,7 +57,7 @@ def test_spread_clusters_hold_every_vertex_once():
 
 def test_incidence_is_the_table_of_clusters_the_other_way_round():
     members, filled = padded([[3, 1, 0], [1], [2, 1]], 4)
-    places, counts = incidence(members, filled, 4)
+    places, counts = incidence(members, 4, filled=filled)
     assert counts.tolist() == [1, 3, 1, 1]
     for vertex, row in enumerate(places.tolist()):
         found = [place for place in row if place < members.size]

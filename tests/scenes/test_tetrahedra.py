@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from jaxrot.scenes import tetrahedra
+from jaxrot.scenes.incidence import incidence
 from jaxrot.scenes.tetrahedra import box, checked, read
 
 UNIT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -22,7 +23,7 @@ def test_a_box_is_filled_without_gaps_and_has_the_mass_of_its_volume():
 
 def test_incidence_names_every_corner_once():
     mesh = box((2, 2, 1), (1, 1, 1))
-    table = tetrahedra.incidence(mesh)
+    table, _ = incidence(mesh.tetrahedra, len(mesh.vertices))
     for vertex, row in enumerate(table):
         named = row[row < mesh.tetrahedra.size]
         np.testing.assert_array_equal(np.sort(named), np.flatnonzero(mesh.tetrahedra.ravel() == vertex))
