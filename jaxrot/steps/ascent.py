@@ -1,4 +1,4 @@
-"""The direction of ascent that Newton's equation gives: a solve whose pivots count by their absolute values."""
+"""A direction in which tr(RᵀA) increases: Newton's equation, solved with the absolute values of the pivots."""
 
 import jax
 import jax.numpy as jnp
@@ -11,13 +11,14 @@ from jaxrot._algebra.select import exchange, is_positive
 
 
 def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps_free_axes: bool = True) -> Vec3:
-    """h⁻¹ v, with the pivots of LDLᵀ replaced by their absolute values; 1/p is p/(p² + δ²), so that 1/0 is 0.
+    """The solution of h x = v, with each pivot of LDLᵀ replaced by its absolute value.
 
-    With diagonal pivoting, so that an axis without a gap shows in the last pivot and not in the rounding of the others.
+    The reciprocal of a pivot p is p/(p² + δ²), which is 0 at p = 0. Diagonal pivoting brings an axis without a gap into
+    the last pivot, and keeps it out of the rounding of the others.
 
     Args:
         h: Symmetric, of any signature.
-        b: QᵀA, whose size decides what is rounding.
+        b: QᵀA. Its norm sets the level of rounding.
         v: The right-hand side, the torque.
         has_absolute_pivots: Static. With False the result is h⁻¹ v, which leads to a saddle where h is indefinite.
         keeps_free_axes: Static. With False the solution has any part along an axis without a gap.
@@ -26,7 +27,7 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps
     magnitude = jnp.abs if has_absolute_pivots else jnp.positive
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
-    # The largest comes first. What is exchanged here is exchanged back, in reverse, at the end.
+    # The largest diagonal entry comes first. The exchanges are undone at the end, in reverse order.
     first = is_positive(jnp.abs(h11) - jnp.abs(h00))
     h00, h11 = exchange(first, h00, h11)
     h02, h12 = exchange(first, h02, h12)
@@ -49,18 +50,19 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps
     inverse1 = s11 / (s11 * s11 + square)
     l12 = s12 * inverse1
     pivot = s22 - l12 * s12
-    # Quotients: along an axis without a gap these are rounding, and only what is divided XLA computes once.
+    # The unknowns are quotients. Along an axis without a gap they are rounding, and XLA computes only quotients once.
     last = y2 - l12 * y1
     x2 = last * magnitude(pivot) / (pivot * pivot + square)
     x1 = (y1 * magnitude(s11) - s11 * s12 * x2) / (s11 * s11 + square)
     x0 = (v0 * magnitude(h00) - h00 * (h01 * x1 + h02 * x2)) / (h00 * h00 + square)
 
     if keeps_free_axes:
-        # That solution has any part along u, which the last pivot belongs to; where the pivot is 0, the shortest has
-        # none. Without this half of all starts turn about the axis that a matrix of rank 1 leaves free, by up to 90°.
+        # The last pivot belongs to the axis u. Where that pivot is 0, the part of the solution along u is arbitrary, and
+        # the shortest solution has none. Without this, half of all starts turn by up to 90° about the axis that a
+        # matrix of rank 1 leaves free.
         u0 = (h01 * l12 - h02) * inverse0
         fourth = square * square
-        # Where one begins and the other ends is a constant to differentiation, whose δ⁻⁸ float32 does not hold.
+        # Its derivative would contain δ⁻⁸, which overflows in float32.
         size = lax.stop_gradient((u0 * u0 + l12 * l12 + 1) * (pivot**4 + fourth) / fourth)
         part = jnp.where(jnp.abs(last) > torque, jnp.zeros_like(fourth), u0 * x0 - l12 * x1 + x2) / size
         x0, x1, x2 = x0 - part * u0, x1 + part * l12, x2 - part
@@ -72,11 +74,12 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps
 
 
 def _resolved(b: Mat3) -> tuple[jax.Array, jax.Array]:
-    """The gap δ below which an axis is not turned about, eps^⅔ ‖B‖, unless the torque about it is more than 64 eps ‖B‖.
+    """Two thresholds: the gap δ = eps^⅔ ‖B‖, and the torque 64 eps ‖B‖.
 
-    The part of the solution along a free axis, whose gap and torque are rounding, is reduced to (eps/δ)⁴, less than
-    eps. A gap may also vanish on the way while the torque does not, a quarter turn off for example: without the second
-    condition 9 of 167,000 random starts stayed there in float32. Both are 1 where B = 0, so that nothing is 0/0.
+    A step does not turn about an axis whose gap is below δ, unless the torque about it exceeds its threshold. The gap
+    and the torque of a free axis are rounding: the part of the solution along it is reduced to (eps/δ)⁴ < eps. A gap
+    can also vanish on the way while the torque does not, for example a quarter turn off. Without the second threshold
+    9 of 167,000 random starts stayed there in float32. Both use the norm 1 where B = 0, which avoids 0/0.
     """
     norm = safe_sqrt(mat3.squared_norm(b))
     norm = jnp.where(norm == 0, jnp.ones_like(norm), norm)

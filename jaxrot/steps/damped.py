@@ -1,4 +1,4 @@
-"""A damped solve for any symmetric matrix, which `cayley` and `quest` share."""
+"""A damped solve for any symmetric matrix, shared by `cayley` and `quest`."""
 
 import jax
 
@@ -8,11 +8,11 @@ from jaxrot._algebra.select import exchange, is_positive
 
 
 def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
-    """H(H²+δ²)⁻¹ v = Re[(H+iδ)⁻¹ v].
+    """The solution H(H²+δ²)⁻¹ v, which is the real part of (H+iδ)⁻¹ v.
 
-    The factorisation is LDLᵀ of the complex symmetric H+iδ. Unlike `rule.damped_inverse` it exchanges rows, so
-    that H may be indefinite, as it is far from the solution, and divides last, so that along a free axis, where the
-    result is rounding, all components have the same.
+    The factorisation is LDLᵀ of the complex symmetric H+iδ. It differs from `rule.damped_inverse` in two ways. It
+    exchanges rows, because H may be indefinite far from the solution. It divides last: along a free axis the result is
+    rounding, and all components must contain the same rounding.
 
     Args:
         h: Symmetric.
@@ -21,7 +21,7 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
     """
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
-    # The largest diagonal entry comes first. What is exchanged here is exchanged back, in reverse, at the end.
+    # The largest diagonal entry comes first. The exchanges are undone at the end, in reverse order.
     first = is_positive(h11 - h00)
     h00, h11 = exchange(first, h00, h11)
     h02, h12 = exchange(first, h02, h12)
@@ -45,8 +45,8 @@ def damped_solve(h: Mat3, delta: jax.Array, v: Vec3) -> Vec3:
 
     l12 = divide(s12, s11)
     pivot = subtract(s22, multiply(l12, s12))
-    # Quotients, not products with reciprocals: along an unresolved axis these are rounding, and XLA computes a quotient
-    # once for all components of the result, a product again and differently for each.
+    # Quotients instead of products with reciprocals. Along an unresolved axis these are rounding. XLA computes a
+    # quotient once for all components of the result, and a product again, with other rounding, for each.
     x2 = divide(subtract(y2, multiply(l12, y1)), pivot)
     x1 = divide(subtract(y1, multiply(s12, x2)), s11)
     x0 = inverse0[0] * v0 - multiply(l1, x1)[0] - multiply(l2, x2)[0]

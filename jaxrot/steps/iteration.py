@@ -1,4 +1,4 @@
-"""The loop that every step runs in."""
+"""The loop in which every step runs."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ def iterate(correction: Callable[[Mat3], Quaternion], a: Mat3, q: Quaternion, it
         correction: From B = QᵀA to the quaternion of the rotation to append; any length but 0.
         a: The matrices on components, their scale removed.
         q: The start, a unit quaternion on components of the same batch shape.
-        iterations: Static trip count, so that the loop is differentiable in reverse too.
+        iterations: Static trip count. It makes the loop differentiable in reverse mode.
 
     Returns:
         The unit quaternion after the last step.

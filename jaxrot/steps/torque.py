@@ -11,8 +11,8 @@ from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 def correction(b: Mat3) -> Quaternion:
     """The rotation by the vector d / (|t| + ε), with B = QᵀA, d = vee(B − Bᵀ) and t = tr B.
 
-    In the body frame of Q the torque Σ rᵢ×aᵢ is d, so that no rotation matrix is multiplied. The step decreases
-    ‖A − Q‖ near the solution; it converges linearly, at the rate of the largest eigenvalue of S/tr S in modulus.
+    The torque Σ rᵢ×aᵢ is d in the body frame of Q, so no rotation matrix is multiplied. The step decreases ‖A − Q‖ near
+    the solution. It converges linearly, at the rate of the largest eigenvalue of S/tr S in modulus.
 
     Args:
         b: QᵀA on components, its scale removed by a power of two.
@@ -20,9 +20,11 @@ def correction(b: Mat3) -> Quaternion:
     Returns:
         The correction as a unit quaternion, to be multiplied from the right; the identity where d = 0, A = 0 included.
 
-    Source: Müller et al. 2016, eq. (7), with the absolute value that its text demands (without it 144 of 2,000 random
-    starts fail for A = 1), with r×a as in (4), not a×r as in (5), and with ε inside the reciprocal and relative to ‖A‖
-    instead of 1e-9 outside it (appendix D), which is NaN for A = 0 and wrong at other scales. About 90 flops.
+    Cost: about 90 flops.
+    Source: Müller et al. 2016, eq. (7), with three corrections. The absolute value is demanded by its text; without it
+    144 of 2,000 random starts fail for A = 1. The product is r×a as in (4), not a×r as in (5). ε is inside the
+    reciprocal and relative to ‖A‖; the paper's 1e-9 outside it (appendix D) gives NaN for A = 0 and is wrong at other
+    scales.
     """
     epsilon = jnp.finfo(b[0][0].dtype).eps * safe_sqrt(mat3.squared_norm(b))
     inverse = safe_divide(jnp.ones_like(epsilon), jnp.abs(mat3.trace(b)) + epsilon)
