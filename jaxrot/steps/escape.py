@@ -44,7 +44,7 @@ def leave_equilibrium(a: Mat3, q: Quaternion) -> Quaternion:
     zero = _ZERO * float(jnp.finfo(c.dtype).eps) * safe_sqrt(mat3.squared_norm(b))
     leaves = (c < -zero) & (mat3.dot(torque, torque) <= c * c)
 
-    # One quotient holds the angle and the decision, 2 for "stay", because XLA computes a quotient once. It would compute
+    # One quotient holds the angle and the decision, 2 for "stay": XLA computes a quotient once. It would compute
     # a cheap expression again for each component. Where the torque is rounding, w could then leave and x stay.
     two = constant_like(c, 2)
     cotangent = jnp.where(leaves, s, two) / jnp.where(leaves, safe_sqrt(s * s + c * c) - c, jnp.ones_like(c))

@@ -8,7 +8,7 @@ from jaxrot._algebra.quaternion import Quaternion
 from jaxrot._algebra.scaling import nonzero_sqrt
 
 # If the trace varies by less than 4 eps ‖B‖ along the circle, its dependence on the angle is rounding. A torque below
-# eps ‖B‖ is rounding too. Steps that followed it turned some of 20,000 matrices of rank 1 by 600 eps about the axis that
+# eps ‖B‖ is rounding too. Steps that follow it turned some of 20,000 matrices of rank 1 by 600 eps about the axis that
 # they leave free, instead of 13 at most.
 _FLAT = 4
 
