@@ -57,7 +57,7 @@ def ascent(h: Mat3, b: Mat3, v: Vec3, *, has_absolute_pivots: bool = True, keeps
     x0 = (v0 * magnitude(h00) - h00 * (h01 * x1 + h02 * x2)) / (h00 * h00 + square)
 
     if keeps_free_axes:
-        # The last pivot belongs to the axis u. Where that pivot is 0, the part of the solution along u is arbitrary; the
+        # The last pivot belongs to the axis u. Where that pivot is 0, the solution along u is arbitrary; the
         # shortest solution has none. Without this, half of all starts turn by up to 90° about the axis that a
         # matrix of rank 1 leaves free.
         u0 = (h01 * l12 - h02) * inverse0
