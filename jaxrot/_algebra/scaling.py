@@ -35,7 +35,7 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
 def scaled(m: _Tree) -> _Tree:
     """The entries of a matrix or quaternion times the power of two that brings the largest one into [2, 4).
 
-    Where one is not finite all are NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
+    An infinite entry becomes NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
     bit. The power is made of bits. A quotient would not do: accelerators round it, and flush the reciprocal of a number
     above 2¹²⁶ to 0.
     """

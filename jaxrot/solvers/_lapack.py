@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable
 
+import jax
 import jax.numpy as jnp
 
 from jaxrot._algebra import mat3
@@ -10,16 +11,17 @@ from jaxrot._algebra.mat3 import Mat3
 
 
 def finite_only(solve: Callable[[Mat3], Mat3]) -> Callable[[Mat3], Mat3]:
-    """Gives a solver zeros instead of NaN, and returns NaN there.
+    """Gives a solver zeros in place of a matrix with NaN, and returns NaN there.
 
-    Scaling turns a matrix with an infinite entry into NaN. On some processors LAPACK's singular value decomposition
-    never returns from such a matrix.
+    Scaling turns an infinite entry into NaN. On some processors LAPACK's singular value decomposition never returns
+    from a matrix that is not finite.
     """
 
     @functools.wraps(solve)
     def guarded(a: Mat3) -> Mat3:
-        is_nan = jnp.isnan(a[0][0])
-        rotation = solve(mat3.where(is_nan, mat3.scale(mat3.identity_like(a), 0.0), a))
-        return mat3.where(is_nan, a, rotation)
+        largest = mat3.largest_entry(a)
+        is_nan = jnp.isnan(largest)
+        rotation = solve(jax.tree.map(lambda entry: jnp.where(is_nan, jnp.zeros_like(entry), entry), a))
+        return jax.tree.map(lambda entry: jnp.where(is_nan, largest, entry), rotation)
 
     return guarded
