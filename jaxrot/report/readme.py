@@ -1,7 +1,8 @@
-"""`python -m jaxrot.report.readme FOLDER`: the README's measured tables and pictures, from a report and its bench.
+"""`python -m jaxrot.report.readme FOLDER` refreshes the measured tables and pictures of all README pages.
 
-The README holds regions between `<!-- measured: NAME -->` and `<!-- /measured -->`; each is written anew. FOLDER is
-what `report --peers` and `report --bench` wrote to, both with `--out FOLDER`.
+The pages are README.md and jaxrot/*/README.md of a clone. A measured region of a page stands between
+`<!-- measured: NAME -->` and `<!-- /measured -->`. The command replaces its text. FOLDER holds the output of
+`report --peers` and of `report --bench`, both run with `--out FOLDER`.
 """
 
 import argparse
@@ -36,38 +37,42 @@ _DTYPES = ("float32", "float64")
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Writes the README's regions and copies its pictures."""
+    """Rewrites the regions of all pages and copies their pictures."""
     parser = argparse.ArgumentParser(prog="python -m jaxrot.report.readme", description=__doc__)
     parser.add_argument("folder", type=Path, help="what `report --peers` and `report --bench` have written")
-    parser.add_argument("--readme", type=Path, default=Path("README.md"))
-    parser.add_argument("--pictures", type=Path, default=Path("notebooks"))
+    parser.add_argument("--root", type=Path, default=Path(), help="the clone whose pages are written (here)")
     options = parser.parse_args(arguments)
     report, bench = (json.loads((options.folder / name).read_text("utf-8")) for name in ("report.json", "bench.json"))
     if report["peers"] is None or report["guards"] is None:
         parser.error(f"{options.folder} holds a report without peers or guards; expected that of `report --peers`")
-    options.readme.write_text(filled(options.readme.read_text("utf-8"), report, bench), "utf-8")
+    for page in pages(options.root):
+        page.write_text(filled(page.read_text("utf-8"), report, bench), "utf-8")
     for name in PICTURES:
-        shutil.copyfile(options.folder / name, options.pictures / name)
+        shutil.copyfile(options.folder / name, options.root / "notebooks" / name)
 
 
-def filled(readme: str, report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
-    """The README with every region written anew.
+def pages(root: Path) -> list[Path]:
+    """The README of a clone and those of the package's folders."""
+    return [root / "README.md", *sorted((root / "jaxrot").glob("*/README.md"))]
+
+
+def filled(page: str, report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
+    """A page with every region replaced.
 
     Raises:
-        KeyError: A region's name is none of `REGIONS`.
+        KeyError: A region's name is not in `REGIONS`.
     """
 
     def region(match: re.Match[str]) -> str:
         return f"{match[1]}{match[2]}{REGIONS[match[1]](report, bench)}\n"
 
-    return _REGION.sub(region, readme)
+    return _REGION.sub(region, page)
 
 
 def methods_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
-    """Every method with its domain, its error on the report's input and its time, the fastest first."""
+    """Every method with its domain, its error on the report's input and its time; the fastest first."""
     accuracy = {(entry["method"], entry["dtype"]): entry for entry in report["accuracy"] if entry["set_name"] == WHOLE}
-    batch = largest_batch([Timing(**entry) for entry in report["timing"]])
-    times = {(e["method"], e["dtype"]): e for e in report["timing"] if e["batch"] == batch}
+    batch, times = _times(report)
     count = next(iter(accuracy.values()))["matrices"]
     rows = []
     for name, method in sorted(jaxrot.METHODS.items(), key=lambda item: times[item[0], "float32"]["median_ns"]):
@@ -91,16 +96,30 @@ def methods_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
     default, control = (times[name, "float32"] for name in (jaxrot.DEFAULT_METHOD, "svd"))
     return (
         f"{_table(header, rows)}\n\n"
-        f"Measured on {_date(report)} by `python -m jaxrot report`: {count:,} matrices A_pq of clusters of the Stanford"
-        " dragon, twisted, bent, squashed, turned inside out and scrambled;"
-        f" {_machine(report)}, batches of {batch:,}, medians of interleaved runs. Timings of the default spread from"
-        f" {_quartiles(default)} ns between the quartiles, those of `svd` from {_quartiles(control)}. Times of methods"
-        " that differ by less than such a spread do not tell them apart."
+        f"Measured on {_date(report)} by `python -m jaxrot report`; {_machine(report)}, batches of {batch:,}, medians"
+        f" of interleaved runs. The input is {count:,} shape-matching matrices of the Stanford dragon, which is"
+        " twisted, bent, squashed, turned inside out and scrambled. Half of the default method's times lie between"
+        f" {_quartiles(default)} ns, half of those of `svd` between {_quartiles(control)} ns. A smaller difference"
+        " between two methods is noise."
+    )
+
+
+def summary_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
+    """The default method's time compared with that of LAPACK's SVD."""
+    batch, times = _times(report)
+    default, control = (
+        " and ".join(f"{number(times[name, dtype]['median_ns'])} ns a matrix in {dtype}" for dtype in _DTYPES)
+        for name in (jaxrot.DEFAULT_METHOD, "svd")
+    )
+    return (
+        f"The default method, `{jaxrot.DEFAULT_METHOD}`, takes {default}. LAPACK's singular value decomposition,"
+        f" `svd`, takes {control}. Measured on {_date(report)} by `python -m jaxrot report`; {_machine(report)},"
+        f" batches of {batch:,}."
     )
 
 
 def peers_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
-    """The sentence on the front, and jaxrot's default beside every peer in float32."""
+    """The default method compared with every peer in float32, and the finding on peers."""
     contenders = [entry for entry in report["peers"]["contenders"] if entry["dtype"] == "float32"]
     shown = [entry for entry in contenders if not entry["is_own"] or entry["name"].startswith(jaxrot.DEFAULT_METHOD)]
     rows = []
@@ -121,7 +140,7 @@ def peers_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
             ]
         )
     header = ["", "threads", "batch", "error: median / 99 %", "outside the contract", "ns a matrix"]
-    header += ["gradient's error: median / 99 %", "families where it is no number", "ns with gradient"]
+    header += ["gradient's error: median / 99 %", "families with a NaN or infinite gradient", "ns with gradient"]
     sentence = next(sentence for sentence in report["findings"] if sentence.startswith("Peers: "))
     return (
         f"{_table(header, rows)}\n\nIn float32; measured on {_date(report)} by `python -m jaxrot report --peers`;"
@@ -130,7 +149,7 @@ def peers_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
 
 
 def speed_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
-    """The library's own goals."""
+    """The library's own speed goals."""
     rows = []
     for goal in bench["goals"]:
         spread = f"{number(goal['median'])} ({number(goal['quartile_1'])}-{number(goal['quartile_3'])})"
@@ -151,7 +170,7 @@ def speed_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
 
 
 def guards_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
-    """The guards of the default method."""
+    """Every guard of the default method: its time, and what breaks without it."""
     by_guard: dict[str, list[Mapping[str, Any]]] = {}
     for price in report["guards"]["default"]:
         by_guard.setdefault(price["guard"], []).append(price)
@@ -168,15 +187,16 @@ def guards_region(report: Mapping[str, Any], bench: Mapping[str, Any]) -> str:
             ]
         )
     nothing = " / ".join(f"{number(price['time']['nanoseconds'])}" for price in by_guard[""])
-    header = ["left out", "time without it over with it, float32 / float64: median (quartiles)"]
-    header += ["matrices outside the contract", "in the families, the worst first"]
+    header = ["left out", "time without it over time with it, float32 / float64: median (quartiles)"]
+    header += ["matrices outside the contract", "families of these matrices, the worst first"]
     return (
         f"{_table(header, rows)}\n\nMeasured on {_date(report)} by `python -m jaxrot report`, on 100,000 Gaussian"
-        f" matrices, for which the default takes {nothing} ns each; {_machine(report)}."
+        f" matrices; {_machine(report)}. With all guards the default method takes {nothing} ns a matrix."
     )
 
 
 REGIONS: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, Any]], str]] = {
+    "summary": summary_region,
     "methods": methods_region,
     "peers": peers_region,
     "speed": speed_region,
@@ -186,6 +206,12 @@ REGIONS: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, Any]], str]] = {
 
 def _table(header: list[str], rows: list[list[str]]) -> str:
     return as_markdown(Table("", header, rows))
+
+
+def _times(report: Mapping[str, Any]) -> tuple[int, dict[tuple[str, str], Mapping[str, Any]]]:
+    """The largest batch and its times by method and dtype."""
+    batch = largest_batch([Timing(**entry) for entry in report["timing"]])
+    return batch, {(entry["method"], entry["dtype"]): entry for entry in report["timing"] if entry["batch"] == batch}
 
 
 def _limit(method: jaxrot.Method, dtype: str) -> str:
@@ -198,7 +224,7 @@ def _pair(error: Mapping[str, Any]) -> str:
 
 
 def _quartiles(timing: Mapping[str, Any]) -> str:
-    return f"{number(timing['quartile_1_ns'])} to {number(timing['quartile_3_ns'])}"
+    return f"{number(timing['quartile_1_ns'])} and {number(timing['quartile_3_ns'])}"
 
 
 def _date(content: Mapping[str, Any]) -> str:

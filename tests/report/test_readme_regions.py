@@ -1,4 +1,4 @@
-"""The README's measured regions: written from a report, and nothing else touched."""
+"""The measured regions of the README pages: written from a report, and nothing else touched."""
 
 import json
 import pathlib
@@ -103,6 +103,13 @@ def test_methods_stand_in_the_order_of_their_times(report, bench):
     assert "Some processor, 2 cores, jax 0.10.1, batches of 1,000" in region
 
 
+def test_the_summary_compares_the_default_method_with_lapack(report, bench):
+    region = readme.summary_region(report, bench)
+    svd = 10 + list(METHODS).index("svd")
+    assert f"`{DEFAULT_METHOD}`, takes 10 ns a matrix in float32 and 10 ns a matrix in float64" in region
+    assert f"`svd`, takes {svd} ns a matrix in float32" in region
+
+
 def test_peers_are_those_of_float32(report, bench):
     region = readme.peers_region(report, bench)
     assert "Peers: none beyond." in region
@@ -128,22 +135,24 @@ def test_an_unknown_region_is_no_region(report, bench):
         readme.filled("<!-- measured: other -->\n<!-- /measured -->", report, bench)
 
 
-def test_the_command_writes_the_readme_and_its_pictures(report, bench, tmp_path):
-    folder, pictures = tmp_path / "report", tmp_path / "pictures"
-    folder.mkdir()
-    pictures.mkdir()
+def test_the_command_writes_every_page_and_the_pictures(report, bench, tmp_path):
+    folder, root = tmp_path / "report", tmp_path / "clone"
+    for path in (folder, root / "notebooks", root / "jaxrot" / "room"):
+        path.mkdir(parents=True)
     (folder / "report.json").write_text(json.dumps(report))
     (folder / "bench.json").write_text(json.dumps(bench))
     for name in readme.PICTURES:
         (folder / name).write_bytes(name.encode())
-    (tmp_path / "README.md").write_text("<!-- measured: speed -->\n<!-- /measured -->\n")
-    readme.main([str(folder), "--readme", str(tmp_path / "README.md"), "--pictures", str(pictures)])
-    assert "svd" in (tmp_path / "README.md").read_text()
-    assert {path.name for path in pictures.iterdir()} == set(readme.PICTURES)
+    written = [root / "README.md", root / "jaxrot" / "room" / "README.md"]
+    for page in written:
+        page.write_text("<!-- measured: speed -->\n<!-- /measured -->\n")
+    readme.main([str(folder), "--root", str(root)])
+    assert all("svd" in page.read_text() for page in written)
+    assert {path.name for path in (root / "notebooks").iterdir()} == set(readme.PICTURES)
 
 
-def test_the_readme_of_this_project_has_every_region_filled():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_pages_of_this_project_hold_every_region_once_and_filled():
+    text = "".join(page.read_text(encoding="utf-8") for page in readme.pages(ROOT))
     regions = re.findall(r"<!-- measured: (\w+) -->\n(.*?)<!-- /measured -->", text, re.DOTALL)
-    assert {name for name, _ in regions} == set(readme.REGIONS)
-    assert all("| :---" in content for _, content in regions)
+    assert sorted(name for name, _ in regions) == sorted(readme.REGIONS)
+    assert all("Measured on" in content or "measured on" in content for _, content in regions)
