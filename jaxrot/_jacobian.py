@@ -106,7 +106,7 @@ def _twist_modes(matrix: jax.Array) -> TwistModes:
     gaps = reciprocal_gaps(s, normalised, factor, 1)
     eigenvalues = 2 * jnp.stack(gaps.over_sums, axis=-1) * saturate(factor, gaps.norm, 0)[..., None]
     axes = mat3.identity_like(u)
-    modes = [mat3.multiply(u, mat3.multiply(mat3.skew(axis), mat3.transpose(v))) for axis in axes]
+    modes = [mat3.multiply(mat3.multiply_skew(u, axis), mat3.transpose(v)) for axis in axes]
     stacked = jnp.stack([mat3.stack(mat3.scale(mode, 0.5**0.5)) for mode in modes], axis=-3)
     return TwistModes(eigenvalues, stacked)
 

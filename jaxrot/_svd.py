@@ -226,4 +226,4 @@ def _real_parts(numbers: tuple[Complex, ...]) -> Vec3:
 
 
 def _axes_tangent(axes: jax.Array, angular_velocity: Vec3) -> jax.Array:
-    return mat3.stack(mat3.multiply(mat3.components(axes), mat3.skew(angular_velocity)))
+    return mat3.stack(mat3.multiply_skew(mat3.components(axes), angular_velocity))

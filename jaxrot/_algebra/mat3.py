@@ -158,6 +158,11 @@ def skew(v: Vec3) -> Mat3:
     return ((zero, -z, y), (z, zero, -x), (-y, x, zero))
 
 
+def multiply_skew(m: Mat3, v: Vec3) -> Mat3:
+    """The product m [v]×: its rows are the vector products of the rows of m with v."""
+    return (cross(m[0], v), cross(m[1], v), cross(m[2], v))
+
+
 def largest_entry(m: object) -> jax.Array:
     """The largest absolute value of an entry; NaN where there is one."""
     return functools.reduce(jnp.maximum, map(jnp.abs, jax.tree.leaves(m)))

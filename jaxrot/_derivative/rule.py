@@ -16,6 +16,7 @@ import jax.numpy as jnp
 
 from jaxrot._algebra import mat3
 from jaxrot._algebra.complex import add, multiply, reciprocal, square, subtract, times
+from jaxrot._algebra.fusion import fusion_barrier
 from jaxrot._algebra.mat3 import Mat3, Vec3
 from jaxrot._derivative.overflow import apply_scaled, normalising_factor, saturate, split_scale
 
@@ -30,7 +31,7 @@ def rotation_tangent(
     """The tangent Ṙ = R[ω]× of the nearest rotation, for three arrays (..., 3, 3); see `angular_tangent`."""
     r = mat3.components(rotation)
     omega = angular_tangent(mat3.components(matrix), r, mat3.components(matrix_dot), damping=damping, order=order)
-    return mat3.stack(mat3.multiply(r, mat3.skew(omega)))
+    return mat3.stack(mat3.multiply_skew(r, omega))
 
 
 def angular_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, damping: float = 0.0, order: int = 0) -> Vec3:
@@ -60,8 +61,8 @@ def stretch_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, order: in
     along = mat3.transpose_multiply(rotation, matrix_dot)
     gaps = _inverse_gaps(matrix, rotation, 0.0, order + 1)
     omega = mat3.apply(gaps.inverse, mat3.axial(along))
-    turn = mat3.multiply(mat3.skew(omega), gaps.stretch)
-    return mat3.symmetric(mat3.subtract(along, turn))
+    # −[ω]× S is the transpose of Sᵀ[ω]×, and a transpose does not change the symmetric part.
+    return mat3.symmetric(mat3.add(along, mat3.multiply_skew(mat3.transpose(gaps.stretch), omega)))
 
 
 def inverse_gap_matrix(matrix: Mat3, rotation: Mat3, *, damping: float = 0.0) -> Mat3:
@@ -85,7 +86,10 @@ def _inverse_gaps(matrix: Mat3, rotation: Mat3, damping: float, order: int) -> _
     """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `saturate`."""
     factor = normalising_factor(matrix)
     stretch = mat3.transpose_multiply(rotation, mat3.scale(matrix, factor))
-    inverse = damped_inverse(mat3.gap_matrix(stretch), resolved_gap(mat3.trace(stretch), damping))
+    # Without the barrier XLA:CPU computes the stretch again for each entry of the inverse: the reverse mode then takes
+    # 1.2 times as long.
+    gaps, delta = fusion_barrier((mat3.gap_matrix(stretch), resolved_gap(mat3.trace(stretch), damping)))
+    inverse = damped_inverse(gaps, delta)
     return _InverseGaps(*inverse, stretch, factor)
 
 
