@@ -1,9 +1,9 @@
-"""jaxrot: the rotation in a 3×3 matrix, in batches, differentiable to any order, right for every finite input."""
+"""jaxrot: nearest rotations of 3×3 matrices in JAX, in batches, differentiable to any order, for every finite input."""
 
 import importlib
 from typing import TYPE_CHECKING
 
-from jaxrot import _startup as _startup  # the first: it handles Ctrl-C while the rest is imported
+from jaxrot import _startup as _startup  # first: it handles Ctrl-C while the rest is imported
 from jaxrot import families as families
 from jaxrot._blocks import in_blocks as in_blocks
 from jaxrot._gap import rotation_gap as rotation_gap

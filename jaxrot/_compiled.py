@@ -1,4 +1,4 @@
-"""What JAX has to know of public functions and records: one program for each, and names to export them by."""
+"""Compilation and export of public functions: one program for each, and serialised names for their records."""
 
 import functools
 import inspect
@@ -15,16 +15,16 @@ _Record = TypeVar("_Record")
 
 
 def compiled(function: Callable[..., _Result]) -> Callable[..., _Result]:
-    """Jits a function of checked arrays, in the computing dtype of the first, which is that of the matrices.
+    """Jits a function of validated arrays. It computes in the computing dtype of the first array, the matrices.
 
-    Further arrays get that dtype too. Results return in the dtype of the first array. Without `jit` JAX would dispatch
-    every operation by itself, 1,800 for the default method, and compile a loop again in every call.
+    Further arrays are converted to that dtype. Results have the dtype of the first array. Without `jit` JAX would
+    dispatch every operation, 1,800 for the default method, and compile a loop again in every call.
 
     Args:
         function: Its positional arguments are arrays, its keyword-only arguments are static.
 
     Returns:
-        The function. Inside another `jit` it is inlined: the outer program is the same as without this one.
+        The jitted function. It is inlined inside another `jit`, whose program is the same as without this one.
     """
     parameters = inspect.signature(function).parameters.values()
     static = [parameter.name for parameter in parameters if parameter.kind is inspect.Parameter.KEYWORD_ONLY]
@@ -46,9 +46,10 @@ def exportable(record: type[_Record]) -> type[_Record]:
 
 
 class ByIdentity:
-    """A user's function as a static argument: the same object is compiled once, an equal one again.
+    """A user's function as a static argument, compared by identity: each function object is compiled once.
 
-    Bound methods of one object are equal even after that object has changed. Functions may also be unhashable.
+    Equality would be wrong: bound methods of one object are equal even after that object has changed. Functions may
+    also be unhashable.
     """
 
     def __init__(self, function: Callable) -> None:

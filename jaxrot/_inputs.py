@@ -1,4 +1,4 @@
-"""The gate: every public function's arguments pass here, and fail here, while the program is traced."""
+"""Validation of the arguments of every public function, while the program is traced."""
 
 import math
 import warnings
@@ -12,7 +12,7 @@ from jax.typing import ArrayLike
 
 from jaxrot._algebra.platform import platform
 
-# A checked argument. NumPy arrays stay what they are until a compiled program takes them.
+# A validated argument. NumPy arrays are not converted: the compiled program takes them.
 Array = jax.Array | np.ndarray
 
 _HALF_PRECISION = (jnp.float16.dtype, jnp.bfloat16.dtype)
@@ -30,7 +30,7 @@ class Computing(NamedTuple):
     dtype: np.dtype
 
 
-# Methods that another one has taken the place of.
+# Old names of methods, and the methods that replaced them.
 _REPLACED = {"half_turn": "singular_pair"}
 
 
@@ -77,7 +77,7 @@ def _as_array(argument: ArrayLike, name: str, expected: str) -> Array:
     if isinstance(argument, np.ndarray):
         if argument.dtype == np.longdouble != np.float64:
             raise TypeError(f"{expected}; got dtype {argument.dtype}: convert it by {name}.astype(numpy.float64)")
-        # The compiled program takes it as it is; `jnp.asarray` would be a program of its own.
+        # Keep the NumPy array: `jnp.asarray` would compile and run a program of its own.
         return argument.astype(argument.dtype.newbyteorder("="), copy=False)
     try:
         return jnp.asarray(argument)
@@ -136,11 +136,11 @@ def check_start(start: ArrayLike, name: str, trailing_shape: tuple[int, ...], ma
 
 
 def check_choice(choice: str, name: str, registry: Mapping[str, object]) -> str:
-    """Returns a name in a registry; for one that was replaced that of its successor, with a warning.
+    """Returns a name in a registry. A name that was replaced gives its successor, with a warning.
 
     Raises:
         TypeError: `choice` is not a string.
-        ValueError: The registry does not hold it; the message lists what it holds.
+        ValueError: The registry does not hold it; the message lists the names that it holds.
     """
     if not isinstance(choice, str):
         raise TypeError(f"{name} must be a string; got {type(choice).__name__}")
@@ -153,20 +153,20 @@ def check_choice(choice: str, name: str, registry: Mapping[str, object]) -> str:
 
 
 def check_iterations(iterations: int) -> int:
-    """Admits a static, non-negative number of iterations.
+    """Validates a static, non-negative number of iterations.
 
     Raises:
-        TypeError: It is no Python integer (a traced value included: the trip count must be static).
-        ValueError: It is negative, or more than the counter of a loop holds.
+        TypeError: It is not a Python integer. A traced value is not one: the trip count must be static.
+        ValueError: It is negative, or too large for the counter of a loop.
     """
     return check_integer(iterations, "iterations", 0)
 
 
 def check_integer(number: int, name: str, least: int) -> int:
-    """Returns a static integer between a least value and the largest of 32 bits.
+    """Returns a static integer between `least` and 2³¹ − 1, the largest of 32 bits.
 
     Raises:
-        TypeError: It is no Python integer (a traced value included: it decides what is computed).
+        TypeError: It is not a Python integer. A traced value is not one: the integer decides what is computed.
         ValueError: It is too small or too large.
     """
     if isinstance(number, bool | np.bool_) or not isinstance(number, int | np.integer):
@@ -178,11 +178,11 @@ def check_integer(number: int, name: str, least: int) -> int:
 
 
 def check_damping(damping: float) -> float:
-    """Admits a static, finite, non-negative relative damping.
+    """Validates a static, finite, non-negative relative damping.
 
     Raises:
-        TypeError: It is no Python number (a traced value included: damping is static).
-        ValueError: It is negative or not finite.
+        TypeError: It is not a Python number. A traced value is not one: damping is static.
+        ValueError: It is negative, NaN or infinite.
     """
     if isinstance(damping, bool) or not isinstance(damping, int | float | np.integer | np.floating):
         raise TypeError(f"damping must be a static Python number; got {type(damping).__name__}")
@@ -196,7 +196,7 @@ def check_damping(damping: float) -> float:
 
 
 def check_function(function: Callable, name: str) -> Callable:
-    """Returns a user's function.
+    """Validates a function of the user.
 
     Raises:
         TypeError: It is not callable.
@@ -207,10 +207,10 @@ def check_function(function: Callable, name: str) -> Callable:
 
 
 def check_flag(flag: bool, name: str) -> bool:
-    """Admits a static yes or no.
+    """Validates a static bool.
 
     Raises:
-        TypeError: It is no Python bool (a traced value included: it decides what is computed).
+        TypeError: It is not a Python bool. A traced value is not one: the flag decides what is computed.
     """
     if not isinstance(flag, bool | np.bool_):
         raise TypeError(f"{name} must be a static Python bool; got {type(flag).__name__}")
@@ -218,17 +218,17 @@ def check_flag(flag: bool, name: str) -> bool:
 
 
 def layout_hint(shape: tuple[int, ...]) -> str:
-    """The line of NumPy that converts an array of another layout to shape (..., 3, 3), for the end of a message.
+    """Returns the NumPy expression that converts an array of another layout to shape (..., 3, 3), for a message.
 
     Args:
-        shape: Of the array.
+        shape: The shape of the array.
 
     Returns:
-        "; if ..., use ..." for every layout that it may have; "" if its shape is (..., 3, 3) or of no known layout.
+        "; if ..., use ..." for every layout that this may be. "" for (..., 3, 3) and for unknown layouts.
     """
     if shape[-2:] == (3, 3):
         return ""
-    # With several batch axes they are spelled out: -1 would merge them.
+    # Spell out several batch axes: -1 would merge them.
     batch = "-1" if len(shape) < 3 else ", ".join(map(str, shape[:-1]))
     last = {
         (9,): f"each row is a matrix, use array.reshape({batch}, 3, 3)",

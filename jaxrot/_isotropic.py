@@ -1,4 +1,4 @@
-"""Isotropic functions of a matrix: functions of its signed singular values, with the derivatives that exist."""
+"""Isotropic functions of a matrix: functions of its signed singular values, with the correct derivatives."""
 
 import functools
 from collections.abc import Callable
@@ -15,21 +15,21 @@ from jaxrot._derivative.divided_differences import divided_differences
 from jaxrot._inputs import check_choice, check_function, check_matrix
 from jaxrot._svd import decomposed, tangent_in_axes
 
-# What `vectors` may be, and the matrix that it stands for.
+# The values of `vectors`, and the matrix that each stands for.
 _VECTORS = {"left_right": "U diag(φ) Vᵀ", "left": "U diag(φ) Uᵀ", "right": "V diag(φ) Vᵀ"}
 
-# notation: per-matrix functions of the singular values, shape (3,), and of parameters that they close over.
+# notation: functions of the singular values of one matrix, shape (3,), and of the parameters that they close over.
 _Function = Callable[..., jax.Array]
 
 
 def isotropic_energy(matrix: ArrayLike, energy: Callable[[jax.Array], jax.Array]) -> jax.Array:
-    """Returns ψ(s1, s2, s3) of the signed singular values, with exact gradient and Hessian.
+    """Returns ψ(s1, s2, s3), a function of the signed singular values of a 3×3 matrix, with exact gradient and Hessian.
 
-    Use it for the energy density of an isotropic hyperelastic material. Composed of `signed_singular_values` instead,
-    its Hessian would be wrong at equal singular values, so at the state of rest.
+    Use it for the energy density of an isotropic hyperelastic material. A composition with `signed_singular_values` has
+    a wrong Hessian at equal singular values, for example at rest.
 
     Args:
-        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32.
+        matrix: A, real, shape (..., 3, 3), any scale.
         energy: ψ, a JAX function from the signed singular values s1 ≥ s2 ≥ |s3| of one matrix, shape (3,), to a scalar.
             It must be symmetric in its arguments. It may close over traced parameters, and is differentiated with
             respect to them too. Static: each function object is compiled once.
@@ -42,10 +42,10 @@ def isotropic_energy(matrix: ArrayLike, energy: Callable[[jax.Array], jax.Array]
         TypeError: Complex or non-numeric matrix, `energy` not callable.
 
     Derivative:
-        The gradient is U diag(∂ψ) Vᵀ. The Hessian uses divided differences of ∂ψ, whose limits are derivatives of ψ. It
-        is exact at equal, nearly equal, zero and negative singular values if ψ is smooth there as a function of A. It
-        is damped as for `nearest_rotation` where ψ is not smooth: at s2 + s3 = 0, for a ψ that changes if two arguments
-        change their signs. Third derivatives are damped at equal singular values.
+        The gradient is U diag(∂ψ) Vᵀ. The Hessian is exact at equal, nearly equal, zero and negative singular values if
+        ψ is smooth there as a function of A. It is damped as for `nearest_rotation` where ψ is not smooth: at
+        s2 + s3 = 0, for a ψ that changes if two arguments change their signs. Third derivatives are damped at equal
+        singular values.
 
     Accuracy:
         Gradient 64 eps, Hessian 1,024 eps, relative to the norms of the derivatives of this and of the next order.
@@ -67,11 +67,11 @@ def isotropic_map(
 ) -> jax.Array:
     """Returns U diag(φ(s)) Vᵀ for a function φ of the signed singular values of A = U diag(s) Vᵀ.
 
-    Use it for stresses, logarithmic strains, or to clamp singular values in plasticity. Composed of
-    `rotation_variant_svd` instead, the derivative would be wrong at equal singular values.
+    Use it for stresses, logarithmic strains, or to clamp singular values in plasticity. A composition with
+    `rotation_variant_svd` has a wrong derivative at equal singular values.
 
     Args:
-        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32.
+        matrix: A, real, shape (..., 3, 3), any scale.
         function: φ, a JAX function from the signed singular values s1 ≥ s2 ≥ |s3| of one matrix, shape (3,), to shape
             (3,). A permutation of its arguments must permute its results. It may close over traced parameters. Static.
         vectors: "left_right" for U diag(φ) Vᵀ; "right" for V diag(φ) Vᵀ, a function of the right stretch; "left" for
@@ -94,9 +94,9 @@ def isotropic_map(
 
     Example:
         >>> import jax.numpy as jnp, jaxrot
-        >>> F = jnp.diag(jnp.array([2.0, 1.0, 0.5]))
-        >>> jaxrot.isotropic_map(F, jnp.log, vectors="right").diagonal().round(2).tolist()
-        [0.69, 0.0, -0.69]
+        >>> F = jnp.diag(jnp.array([4.0, 1.0, 0.25]))
+        >>> [round(x) for x in jaxrot.isotropic_map(F, jnp.log2, vectors="right").diagonal().tolist()]
+        [2, 0, -2]
 
     Source: Daleckii and Krein 1965; Smith, de Goes and Kim 2019.
     """
@@ -121,7 +121,7 @@ def _isotropic_map(matrix: jax.Array, *, function: ByIdentity, vectors: str) -> 
 def _converted(
     function: _Function, name: str, shape: tuple[int, ...], dtype: np.dtype
 ) -> tuple[_Function, tuple[jax.Array, ...]]:
-    """The function with the traced arrays that it closes over as further arguments, and these."""
+    """Returns the function with the traced arrays that it closes over as further arguments, and these arrays."""
     example = jax.ShapeDtypeStruct((3,), dtype)
     converted, parameters = jax.closure_convert(function, example)
     result = jax.eval_shape(converted, example, *parameters)
@@ -134,7 +134,7 @@ def _converted(
 
 
 def _batched(function: _Function, s: jax.Array, parameters: tuple) -> jax.Array:
-    """The function of every matrix's singular values."""
+    """Applies the function to the singular values of every matrix."""
     for _ in range(s.ndim - 1):
         function = jax.vmap(function, in_axes=(0, *(None for _ in parameters)))
     return function(s, *parameters)
@@ -176,7 +176,8 @@ def _mapped_jvp(function: _Function, vectors: str, order: int, primals, tangents
     batched = lambda s, *parameters: _batched(function, s, parameters)  # noqa: E731
     phi, phi_dot = jax.jvp(batched, (s, *parameters), (s_dot, *parameters_dot))
 
-    # notation: the part of UᵀȦV off the diagonal is a symmetric and a skew matrix, a and b, in the planes (y, z), ...
+    # notation: UᵀȦV off the diagonal is the sum of a symmetric and a skew matrix, a and b, in the planes (y, z), ...
+    # Each is multiplied by divided differences of φ, whose limits are derivatives of φ.
     a = ((m[1][2] + m[2][1]) * 0.5, (m[2][0] + m[0][2]) * 0.5, (m[0][1] + m[1][0]) * 0.5)
     b = ((m[1][2] - m[2][1]) * 0.5, (m[2][0] - m[0][2]) * 0.5, (m[0][1] - m[1][0]) * 0.5)
     at_parameters = lambda s: batched(s, *parameters)  # noqa: E731

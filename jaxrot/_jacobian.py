@@ -22,11 +22,11 @@ from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 @exportable
 class TwistModes(NamedTuple):
-    """The eigenvectors of the Jacobian of R that are not in its null space.
+    """The eigenpairs of the Jacobian of the nearest rotation with nonzero eigenvalues.
 
     Attributes:
-        eigenvalues: 2/(s2+s3), 2/(s1+s3), 2/(s1+s2), shape (..., 3): the largest first, but for those damped to 0.
-        modes: U [eᵢ]× Vᵀ/√2, shape (..., 3, 3, 3), the first of these axes counts them; orthonormal.
+        eigenvalues: 2/(s2+s3), 2/(s1+s3), 2/(s1+s2), shape (..., 3), the largest first; damped ones are 0.
+        modes: U [eᵢ]× Vᵀ/√2, shape (..., 3, 3, 3), orthonormal. The first of the last three axes counts the modes.
     """
 
     eigenvalues: jax.Array
@@ -34,10 +34,10 @@ class TwistModes(NamedTuple):
 
 
 def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
-    """The Jacobian of the nearest rotation as a 9×9 matrix, in closed form.
+    """Returns the Jacobian of the nearest rotation as a 9×9 matrix, ∂vec(R)/∂vec(A), in closed form.
 
-    J = ∂vec(R)/∂vec(A), vec row by row: vec(Ṙ) = J vec(Ȧ). J = T H⁻¹ Tᵀ with H = tr(S)·1 − S, S = RᵀA, and the rows
-    e_n × r_m of T, r_m those of R: symmetric and positive semidefinite, of rank 3.
+    vec goes row by row: vec(Ṙ) = J vec(Ȧ). J = T H⁻¹ Tᵀ with H = tr(S)·1 − S and S = RᵀA. The rows of T are e_n × r_m,
+    where r_m are the rows of R. J is symmetric positive semidefinite of rank 3.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
@@ -45,9 +45,8 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
         damping: Relative damping of H⁻¹, as for `nearest_rotation`. Static.
 
     Returns:
-        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit; exactly symmetric; inf where the dtype does not
-        hold it. Accuracy, and what happens where R is not unique, as for the derivative of `nearest_rotation`, which it
-        is.
+        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit. J is exactly symmetric, and inf where it exceeds
+        the dtype. Accuracy and damping are those of the derivative of `nearest_rotation`.
 
     Raises:
         ValueError: Wrong shape, unknown method, negative damping.
@@ -59,6 +58,11 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
     Derivative:
         The second derivative of R.
 
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> [round(x) for x in jnp.linalg.eigvalsh(jaxrot.rotation_jacobian(jnp.eye(3))).tolist()]
+        [0, 0, 0, 0, 0, 0, 1, 1, 1]
+
     Source: Kim and Eberle, "Dynamic deformables", 2020 (the rotation gradient), with H instead of singular vectors.
     """
     method = check_choice(method, "method", METHODS)
@@ -67,31 +71,36 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
 
 @compiled
 def _rotation_jacobian(matrix: jax.Array, *, method: str, damping: float) -> jax.Array:
-    # One derivative has been taken when the Jacobian is formed: R's is the second, and saturates as that.
+    # Order 1: the Jacobian is a first derivative. So the derivative of this R is a second one, and saturates as such.
     rotation = nearest(matrix, method, damping, 1)
     r = mat3.components(rotation)
     return _quadratic_form(r, inverse_gap_matrix(mat3.components(matrix), r, damping=damping))
 
 
 def twist_modes(matrix: ArrayLike) -> TwistModes:
-    """The three directions of A in which R turns, and how fast: the eigenpairs of `rotation_jacobian`.
+    """Returns the twist modes: the three eigenpairs, of nonzero eigenvalue, of the Jacobian of the nearest rotation R.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
 
     Returns:
-        (eigenvalues, modes). The eigenvalues are 2/(sᵢ+sⱼ), in one over the unit of A; one whose sᵢ+sⱼ is below about
-        64 eps tr S is damped to 0. A matrix with NaN or inf gives NaN.
+        (eigenvalues, modes). A change of A along a mode turns R at the rate 2/(sᵢ+sⱼ), sᵢ the signed singular values,
+        in one over the unit of A. It is damped to 0 if sᵢ+sⱼ is below about 64 eps tr S. NaN or inf in A gives NaN.
 
     Raises:
         ValueError: Wrong shape.
         TypeError: Complex or non-numeric matrix.
 
     Uniqueness:
-        The modes of equal singular values are one basis of the many.
+        Where singular values are equal, the modes are one of many bases.
 
     Derivative:
         As for `rotation_variant_svd`.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> [round(x, 3) for x in jaxrot.twist_modes(jnp.diag(jnp.array([3.0, 1.0, 1.0]))).eigenvalues.tolist()]
+        [1.0, 0.5, 0.5]
 
     Source: Smith, de Goes and Kim, "Analytic eigensystems for isotropic distortion energies", 2019.
     """
@@ -112,28 +121,34 @@ def _twist_modes(matrix: jax.Array) -> TwistModes:
 
 
 def arap_hessian(matrix: ArrayLike, *, psd: bool = True) -> jax.Array:
-    """The Hessian of the as-rigid-as-possible energy ‖A − R(A)‖² as a 9×9 matrix, projected or not.
+    """Returns the Hessian of the as-rigid-as-possible energy ‖A − R(A)‖² as a 9×9 matrix, projected by default.
 
-    The gradient is 2(A − R), the Hessian 2(1 − J). Its eigenvalues are 2, six times, and 2 − 4/(sᵢ+sⱼ): negative where
-    A is compressed so far that sᵢ+sⱼ < 2, and there Newton's method on it may climb.
+    The gradient is 2(A − R), the Hessian 2(1 − J) with J of `rotation_jacobian`. Six eigenvalues are 2, the others
+    2 − 4/(sᵢ+sⱼ) for the signed singular values sᵢ. These are negative where A is so compressed that sᵢ+sⱼ < 2. There
+    an unprojected Newton step may increase the energy.
 
     Args:
         matrix: A, the deformation gradient, real, shape (..., 3, 3), near the scale of a rotation.
-        psd: Replace the negative eigenvalues by 0: the nearest positive semidefinite matrix. Static.
+        psd: Replace negative eigenvalues by 0, which gives the nearest positive semidefinite matrix. Static.
 
     Returns:
         The Hessian, shape (..., 9, 9), dtype of `matrix`, vec row by row; exactly symmetric.
 
     Raises:
         ValueError: Wrong shape.
-        TypeError: Complex or non-numeric matrix; `psd` is no static bool.
+        TypeError: Complex or non-numeric matrix; `psd` is not a static bool.
 
     Uniqueness:
-        Where R is not unique the energy has a kink, and this is the Hessian beside it: projected, the eigenvalue about
-        the free axis is 0; not projected, it is 2, because J is damped there.
+        Where R is not unique the energy is not differentiable. This is the Hessian of one of its smooth branches. The
+        eigenvalue about the free axis is 0 if projected. It is 2 if not, because J is damped there.
 
     Derivative:
-        Right at equal singular values too, to first order; projected it has a kink where sᵢ+sⱼ = 2.
+        To first order, right at equal singular values too. If projected, not differentiable where sᵢ+sⱼ = 2.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> [round(x) for x in jnp.linalg.eigvalsh(jaxrot.arap_hessian(0.5 * jnp.eye(3), psd=False)).tolist()]
+        [-2, -2, -2, 2, 2, 2, 2, 2, 2]
 
     Source: Smith, de Goes and Kim 2019; Lin et al., "Isotropic ARAP energy using Cauchy–Green invariants", 2022.
     """
@@ -150,9 +165,9 @@ def _arap_hessian(matrix: jax.Array, *, psd: bool) -> jax.Array:
 
 @jax.custom_jvp
 def _clamped(matrix: jax.Array) -> jax.Array:
-    """H⁻¹ with its eigenvalues 1/g held below ½, where those of 2(1 − J) would become negative: V φ(g) Vᵀ.
+    """H⁻¹ with its eigenvalues 1/g clamped to at most ½: V φ(g) Vᵀ with φ(g) = 1/max(g, 2).
 
-    φ(g) = 1/max(g, 2). Clamped, nothing is large: there is no gap to resolve.
+    Above ½ those of 2(1 − J) would be negative. A clamped inverse is never large, so it needs no damping.
     """
     _, s, _, right = decomposed(matrix, 1)
     return mat3.stack(_in_axes(right, _diagonal(_clamped_inverses(_gaps(s)))))
@@ -160,8 +175,8 @@ def _clamped(matrix: jax.Array) -> jax.Array:
 
 @_clamped.defjvp
 def _clamped_jvp(primals, tangents):
-    # By divided differences of φ (Daleckii and Krein): V's own derivative is damped where singular values are equal,
-    # and there that of V φ Vᵀ exists all the same.
+    # Divided differences of φ (Daleckii and Krein). The derivative of V is damped where singular values are equal, but
+    # that of V φ Vᵀ exists there.
     (matrix,), (matrix_dot,) = primals, tangents
     left, s, _, right = decomposed(matrix, 1)
     v = mat3.components(right)
@@ -175,7 +190,8 @@ def _clamped_jvp(primals, tangents):
 
 def _gaps(singular_values: jax.Array) -> Vec3:
     largest = jnp.finfo(singular_values.dtype).max
-    # Singular values and their sums may be infinite where the matrix is not, and differences must not be NaN.
+    # Clamp before and after the sums. Singular values and their sums may be infinite for a finite matrix, and a later
+    # difference of two infinities would be NaN.
     halves = lax.clamp(-largest, singular_values, largest) * 0.5
     s1, s2, s3 = halves[..., 0], halves[..., 1], halves[..., 2]
     x, y, z = (2 * lax.clamp(-largest / 4, gap, largest / 4) for gap in (s2 + s3, s3 + s1, s1 + s2))
@@ -188,16 +204,16 @@ def _clamped_inverses(gaps: Vec3) -> Vec3:
 
 
 def _at_least_two(gap: jax.Array) -> jax.Array:
-    # Not a maximum: on jax 0.10 its derivative fails inside `vmap` on a mesh with Explicit axes.
+    # A choice instead of `jnp.maximum`, whose derivative fails on jax 0.10 inside `vmap` on a mesh with Explicit axes.
     return jnp.where(gap < 2, jnp.full_like(gap, 2), gap)
 
 
 def _slopes(gap: jax.Array, gaps: Vec3) -> Vec3:
-    """(φ(g) − φ(gᵢ))/(g − gᵢ) for the three gᵢ, φ′ where they are equal: both clamped, 0; neither, −1/(g gᵢ)."""
+    """(φ(g) − φ(gᵢ))/(g − gᵢ) for the three gᵢ, and φ′ where g = gᵢ. If both are clamped 0, if neither −1/(g gᵢ)."""
 
     def slope(other: jax.Array) -> jax.Array:
         smaller, larger = exchange(gap > other, gap, other)
-        # The part of the way from the smaller to the larger on which φ is not constant.
+        # The fraction of the interval from the smaller to the larger gap on which φ is not constant.
         part = safe_divide(jnp.where(larger > 2, larger - 2, 0), larger - smaller)
         share = jnp.where(smaller >= 2, jnp.ones_like(gap), part)
         return -share / (_at_least_two(larger) * _at_least_two(smaller))
@@ -219,15 +235,15 @@ def _in_axes(axes: jax.Array, m: Mat3) -> Mat3:
 def _quadratic_form(rotation: Mat3, m: Mat3) -> jax.Array:
     """T M Tᵀ, shape (..., 9, 9), for a symmetric M; the rows of T are e_n × r_m, those of [r_m]×, r_m the rows of R.
 
-    By broadcasting, so that XLA writes the 81 entries in one pass and not in 81.
+    Broadcasting lets XLA write the 81 entries in one pass instead of 81.
     """
     t = jnp.concatenate([mat3.stack(mat3.skew(row)) for row in rotation], axis=-2)
     product = _product(_product(t, mat3.stack(mat3.symmetric(m))), jnp.swapaxes(t, -1, -2))
-    # (TM)Tᵀ and its transpose differ in rounding.
+    # (TM)Tᵀ and its transpose differ in rounding; the mean is exactly symmetric.
     return 0.5 * (product + jnp.swapaxes(product, -1, -2))
 
 
 def _product(a: jax.Array, b: jax.Array) -> jax.Array:
-    """The matrix product of (..., n, 3) and (..., 3, m), by elementwise products: an accelerator rounds `@` to TF32."""
+    """The matrix product of (..., n, 3) and (..., 3, m) by elementwise products: accelerators may round `@` to TF32."""
     x, y, z = (a[..., i][..., None] * b[..., i, :][..., None, :] for i in range(3))
     return x + y + z

@@ -1,4 +1,4 @@
-"""The nearest rotation of a matrix, from a cold start."""
+"""The nearest rotation of a matrix from a cold start: without a previous rotation."""
 
 import functools
 from collections.abc import Callable
@@ -16,40 +16,41 @@ from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 
 def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
-    """The rotation nearest to a 3×3 matrix.
+    """Returns the rotation nearest to a 3×3 matrix (Kabsch, Wahba, orthogonal Procrustes, polar decomposition).
 
-    R = argmin ‖A − R‖_F = argmax tr(RᵀA) over the rotations, det R = +1, whatever the sign of det A; R(cA) = R(A) for
-    c > 0. It is the rotational part of the polar decomposition, the solution of Wahba's problem and of Kabsch's.
+    R = argmin ‖A − R‖_F = argmax tr(RᵀA) over the rotations, det R = +1, for either sign of det A.
 
     Args:
-        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
-            default floating dtype, float64 in float32 unless JAX's 64-bit types are on. Entries below the smallest
-            normal number count as 0.
-        method: A name in `METHODS`, whose record states the method's domain. The default keeps the accuracy below for
-            every finite matrix.
-        damping: Relative damping δ/tr(RᵀA) ≥ 0 of the derivative, for learning: it bounds the norm of the derivative
-            by 1/δ. The value is not touched. Static.
+        matrix: A, real, shape (..., 3, 3), any scale. Half precision is computed in float32, integers in the default
+            floating dtype, float64 in float32 unless x64 is on. Subnormal entries count as 0.
+        method: A name in `METHODS`. Static.
+        damping: Relative damping δ/tr(RᵀA) ≥ 0 of the derivative alone, whose norm is then at most 1/δ. Static.
 
     Returns:
-        R, shape (..., 3, 3), dtype of `matrix`. With κ = s1/(s2+s3) and eps of the computing dtype the default method's
-        error is at most 8 eps (1+κ), ‖RᵀR − 1‖_F at most 10 eps. A matrix with NaN or inf gives NaN, its neighbours
-        are untouched.
+        R, shape (..., 3, 3), dtype of `matrix`. NaN for a matrix with NaN or inf; the others are not affected.
 
     Raises:
         ValueError: Wrong shape, unknown method, negative damping.
         TypeError: Complex or non-numeric matrix, traced method or damping, float64 on a TPU.
 
     Uniqueness:
-        R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|: rank 2 and inverted matrices are fine.
-        Elsewhere R is one of the rotations with the largest tr(RᵀA). The same compiled program returns the same one
-        wherever the matrix stands in the batch; another program (eager, another batch size) may return another.
+        R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|. Elsewhere R is one maximiser of
+        tr(RᵀA), always the same in one compiled program; another program may return another.
 
     Derivative:
-        Forward and reverse, to any order, by one rule for every method: the derivative of the nearest rotation at the
-        returned R. For an approximate method (`METHODS[method].exact` is False) that is not the derivative of its
-        formula. Exact at equal singular values; along an axis whose gap sᵢ+sⱼ is below about 64 eps·tr(RᵀA) it tends
-        to 0. It is finite for every finite matrix, in both modes and one of the other: where the dtype does not hold
-        it, it is saturated.
+        That of the nearest rotation, also for approximate methods, forward and reverse, to any order. Exact at equal
+        singular values. Finite for every finite matrix: it tends to 0 along an axis whose gap sᵢ+sⱼ is below about
+        64 eps·tr(RᵀA), and saturates where it would overflow.
+
+    Accuracy:
+        Default method, κ = s1/(s2+s3) < 1/(8 eps), eps of the computing dtype: the error is at most 8 eps (1+κ),
+        ‖RᵀR − 1‖_F at most 10 eps.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.array([[0.0, -2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.5]])
+        >>> jaxrot.nearest_rotation(A).round().astype(int).tolist()
+        [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
     Source: Müller et al. 2016, section 3 (the problem); `METHODS[method].source` (the algorithm).
     """
@@ -58,14 +59,14 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
 
 
 def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping: float = 0.0) -> jax.Array:
-    """The unit quaternion (w, x, y, z), w ≥ 0, of the rotation nearest to a 3×3 matrix.
+    """Returns the unit quaternion (w, x, y, z), w ≥ 0, of the rotation nearest to a 3×3 matrix.
 
-    q = argmax tr(R(q)ᵀA); everything said of `nearest_rotation` holds.
+    q = argmax tr(R(q)ᵀA). Accuracy and limits are those of `nearest_rotation`.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
-        method: A name in `METHODS`.
-        damping: Relative damping of the derivative, static.
+        method: A name in `METHODS`. Static.
+        damping: Relative damping of the derivative. Static.
 
     Returns:
         q, shape (..., 4), dtype of `matrix`.
@@ -75,11 +76,17 @@ def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, 
         TypeError: Complex or non-numeric matrix, traced method or damping, float64 on a TPU.
 
     Uniqueness:
-        q and −q are one rotation; w ≥ 0 chooses. At a half turn, w = 0, the sign is the one that makes the largest
-        component positive, and it jumps there.
+        q and −q are the same rotation; the sign with w ≥ 0 is returned. At a half turn w is 0. There the largest
+        component is positive, and q jumps.
 
     Derivative:
-        That of `nearest_rotation`; on the side of the jump that was returned.
+        As for `nearest_rotation`. At a half turn it is that of the returned side of the jump.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
+        >>> [round(x, 3) for x in jaxrot.nearest_quaternion_wxyz(A).tolist()]
+        [0.5, 0.5, 0.5, 0.5]
 
     Source: Shepperd 1978, for the conversion.
     """
@@ -100,18 +107,18 @@ def _nearest_quaternion(matrix: jax.Array, *, method: str, damping: float) -> ja
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1, 2, 3))
 def nearest(matrix: jax.Array, method: str, damping: float, order: int) -> jax.Array:
-    """The solver, without its own derivative; `order` counts the derivatives taken, see `overflow.saturate`."""
+    """Runs the solver, which has no derivative rule; `order` counts the derivatives taken, see `overflow.saturate`."""
     return solved(METHODS[method].solve, matrix)
 
 
 def solved(solve: Callable[[Mat3], Mat3], matrix: jax.Array) -> jax.Array:
-    """What a solver makes of matrices (..., 3, 3) of any scale."""
+    """Returns what a solver computes from matrices (..., 3, 3) of any scale."""
     return mat3.stack(solve(scaled(mat3.components(matrix))))
 
 
 @nearest.defjvp
 def _nearest_jvp(method: str, damping: float, order: int, primals, tangents):
     (matrix,), (matrix_dot,) = primals, tangents
-    # The decorated function, not the solver: or the second derivative would differentiate the algorithm.
+    # Call the decorated function: if this called the solver, the second derivative would differentiate the algorithm.
     rotation = nearest(matrix, method, damping, order + 1)
     return rotation, rotation_tangent(matrix, rotation, matrix_dot, damping=damping, order=order)

@@ -18,11 +18,11 @@ from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 @exportable
 class PolarDecomposition(NamedTuple):
-    """A = R S.
+    """The polar decomposition A = R S.
 
     Attributes:
         rotation: R, shape (..., 3, 3), det R = +1.
-        stretch: S, shape (..., 3, 3), symmetric; with the eigenvalues s1, s2, s3.
+        stretch: S, shape (..., 3, 3), symmetric, with the eigenvalues s1, s2, s3.
     """
 
     rotation: jax.Array
@@ -30,32 +30,40 @@ class PolarDecomposition(NamedTuple):
 
 
 def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> PolarDecomposition:
-    """The rotation R and the symmetric stretch S with A = R S.
+    """Returns the polar decomposition A = R S of a 3×3 matrix: the nearest rotation R and the symmetric stretch S.
 
-    R = argmax tr(RᵀA) over the rotations, S = RᵀA. Unlike that of textbooks R is a rotation for det A < 0 too; S then
-    has one negative eigenvalue, the smallest in modulus.
+    R = argmax tr(RᵀA) over the rotations, and S = RᵀA. In textbooks R is a reflection for det A < 0. Here R is a
+    rotation, and S then has one negative eigenvalue, the smallest in modulus.
 
     Args:
-        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
-            default floating dtype.
+        matrix: A, real, shape (..., 3, 3), any scale.
         method: A name in `METHODS`, for R. Static.
 
     Returns:
-        R as from `nearest_rotation`, and S in the unit of A, exactly symmetric; by the default method A = R S to 32 eps
-        s1, while that is a normal number. inf where S exceeds the dtype; a matrix with NaN or inf gives NaN.
+        (rotation, stretch). R is that of `nearest_rotation`. S is exactly symmetric, in the unit of A, and inf where it
+        exceeds the dtype. A matrix with NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape, unknown method.
         TypeError: Complex or non-numeric matrix, traced method.
 
     Uniqueness:
-        R is unique iff s2+s3 > 0, and so is S. The eigenvalues of S are always unique. Where s3 ≥ 0 S is the square
-        root of AᵀA, unique whatever R is.
+        R and S are unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|, the eigenvalues of S. These are
+        always unique. Where s3 ≥ 0, S is the square root of AᵀA, which is unique even if R is not.
 
     Derivative:
-        That of the nearest rotation for R, Ṡ = RᵀȦ − [ω]× S for S, to any order. Exact at equal singular values; along
-        an axis of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. Ṡ does not depend on the scale of A, and
-        is at most some κ times Ȧ.
+        For R as for `nearest_rotation`; Ṡ = RᵀȦ − [ω]× S. To any order, exact at equal singular values. Along an axis
+        of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. Ṡ does not depend on the scale of A, and is at
+        most a few κ = s1/(s2+s3) times Ȧ.
+
+    Accuracy:
+        A = R S to 32 eps s1 by the default method, if 32 eps s1 is a normal number.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.diag(jnp.array([3.0, 2.0, -1.0]))
+        >>> jaxrot.polar_decomposition(A).stretch.diagonal().round().astype(int).tolist()
+        [3, 2, -1]
 
     Source: Higham 1986; for R see `nearest_rotation`.
     """
@@ -70,11 +78,12 @@ def _polar_decomposition(matrix: jax.Array, *, method: str) -> PolarDecompositio
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2,))
 def _stretch(matrix: jax.Array, rotation: jax.Array, order: int) -> jax.Array:
-    """S = RᵀA, a function of A alone: R's tangent is part of the rule. `order`: see `stretch_tangent`."""
+    """S = RᵀA, as a function of A alone: the rule includes R's tangent. `order`: see `stretch_tangent`."""
     m = mat3.components(matrix)
-    # Scaled, a sum of three products does not overflow where S does not.
+    # The product of the scaled matrix does not overflow. Unscaled, a sum of three products could, even if S does not.
     product = mat3.stack(mat3.transpose_multiply(mat3.components(rotation), scaled(m)))
-    # Of whole arrays: an entry and its mirror image then add the same two stored numbers, and S is exactly symmetric.
+    # Symmetrise whole arrays: an entry and its mirror image then add the same two stored numbers, so S is exactly
+    # symmetric. On components XLA could round the two differently.
     symmetric = 0.5 * (product + jnp.swapaxes(product, -1, -2))
     return mat3.stack(unscaled(mat3.components(symmetric), m))
 

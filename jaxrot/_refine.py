@@ -1,4 +1,4 @@
-"""The nearest rotation from a warm start, by a fixed number of steps."""
+"""The nearest rotation of a matrix from a warm start, by a fixed number of steps."""
 
 import functools
 from typing import NamedTuple
@@ -17,7 +17,14 @@ from jaxrot.steps import STEPS
 from jaxrot.steps.escape import leave_equilibrium
 from jaxrot.steps.iteration import iterate
 
-# What `derivative` may be, and what is then differentiated.
+# The values of `derivative`, and what each differentiates. At convergence both agree, as fast as the step converges.
+#
+# "implicit" assumes the limit, which does not depend on the start. It costs one small solve for any number of
+# iterations. If the iteration stops early it is not the derivative of the result.
+#
+# "unrolled" is right wherever the iteration stops, for example in a simulation that is differentiated through its warm
+# starts. It is not saturated as the rule is: it overflows at the ends of the dtype's range, and that of `torque` where
+# tr(RᵀA) is 0 to the last digit.
 _DERIVATIVES = {"implicit": "the nearest rotation, by its rule", "unrolled": "the iterations that are run"}
 
 
@@ -30,60 +37,48 @@ def refine_rotation(
     escape: bool = False,
     derivative: str = "implicit",
 ) -> jax.Array:
-    """Moves a rotation towards the one nearest to a 3×3 matrix, by a fixed number of steps.
+    """Returns a rotation closer to the one nearest to a 3×3 matrix, by a fixed number of steps from a warm start.
 
-    Each step increases tr(RᵀA) towards its maximum over the rotations. Made for simulations: the rotation of the last
-    frame is the start, few iterations are enough, and what A leaves undetermined is kept from the start (all of it for
-    A = 0, the angle about the axis for rank 1).
+    In a simulation start from the rotation of the last frame.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
-        rotation: The start, shape (..., 3, 3), times any factor but 0; its batch axes broadcast against those of
-            `matrix`.
-        step: A name in `STEPS`. The paper's `torque` is enough where the singular values are of one size and the
-            rotation changes little; a rod that turns by 5° a frame it follows 6 to 13° late, or not at all. Static.
-        iterations: How many steps, ≥ 0. Static.
-        escape: Leave a start that is an equilibrium without being nearest, before the first step. Static; it costs
-            about one step more, and nothing when it is off.
-        derivative: `"implicit"` or `"unrolled"`, see below. Static.
+        rotation: The start, shape (..., 3, 3), times any factor but 0. The batch axes broadcast.
+        step: A name in `STEPS`. Static.
+        iterations: Number of steps, ≥ 0. Static.
+        escape: Leave a start that is an equilibrium but not nearest. Static.
+        derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:
-        A rotation, shape (..., 3, 3) of the broadcast batch, dtype of `matrix`: valid as a carry of `lax.scan`.
-
-    Convergence:
-        `torque`: linear, the error shrinks by max|sᵢ| / |Σsᵢ| a step. `torque_exact_angle`: linear, about half the
-        steps, and one for a multiple of a rotation; the trace never gets smaller. `newton`: cubic, from any start, the
-        trace never gets smaller. `cayley`: cubic, from within 90°. `quest`: exact in one step but near a half turn, as
-        far as the sum of the singular values is.
-
-        Shares *outside* the error 8 eps (1+κ), κ = s1/(s2+s3), of 170,000 matrices (`cayley`, `quest`: 20,000) of each
-        population, Gaussian, κ log-uniform, s2 and s3 log-uniform; the worst of them, float32 and float64. `newton`:
-        from 45° off after 5 steps none for κ < 10, 0.05 % for κ < 1e3; from uniformly random starts after 8 steps one
-        matrix for κ < 1e3, after 16 with `escape` none. `cayley`: from 45° off after 5 steps none for κ < 10, 2.7 % for
-        κ < 1e3. `quest`: none for κ < 10, 0.3 % in float32 and none in float64 for κ < 1e3. The linear steps need tens.
+        A rotation, shape (..., 3, 3), dtype of `matrix`: valid as a carry of `lax.scan`.
 
     Raises:
         ValueError: Wrong shape, unknown step or derivative, negative iterations.
-        TypeError: Complex or non-numeric arrays, traced step, iterations, escape or derivative.
+        TypeError: Complex or non-numeric arrays, traced options.
 
     Uniqueness:
-        From a start where the torque is zero but tr(RᵀA) is not largest (an exact half turn off) every step stands
-        still, unless `escape` is on. At A = 0 the start is kept, at rank 1 its angle about the free axis (with
-        `quest` to √eps).
+        The start decides what A leaves undetermined: everything for A = 0, the angle about the free axis for rank 1
+        (with `quest` to √eps). A start that is not nearest but has zero torque, exactly half a turn off, is returned
+        unless `escape` is on.
 
     Derivative:
-        `"implicit"`: the rule of `nearest_rotation`, at the rotation that was reached, and zero with respect to the
-        start, on which the limit does not depend. It is right at convergence, costs one small solve whatever the number
-        of iterations, and has any order. Where the iteration stops early it is not the derivative of the result.
+        `"implicit"`: that of `nearest_rotation`, and 0 with respect to the start. Right at convergence, to any order.
+        `"unrolled"`: that of the steps, with respect to both. Right before convergence too; may overflow.
 
-        `"unrolled"`: the derivative of what was computed, with respect to the matrix and to the start, in forward and
-        reverse mode. It is right wherever the iteration stops, for a simulation that is itself differentiated through
-        its warm starts for example; memory and time in reverse mode grow with the iterations. At convergence both
-        agree, as fast as the step converges. It is not saturated as the rule is: at the ends of the dtype's range it
-        overflows, and that of `torque` where tr(RᵀA) is 0 to the last digit. The start counts as the quaternion of its
-        largest column: a change of a matrix that leaves the rotations has a derivative too, and no meaning.
+    Accuracy:
+        `newton` converges cubically from any start, `cayley` from within 90°. `torque` and `torque_exact_angle`
+        converge linearly. `quest` needs one step, except near a half turn.
 
-    Source: `STEPS[step].source`; for `torque` with the errata stated in `steps/torque.py`.
+    Cost:
+        `escape` costs about one step. Unrolled reverse mode takes time and memory for every step.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.array([[0.0, -2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.5]])
+        >>> jaxrot.refine_rotation(A, jnp.eye(3), iterations=5).round().astype(int).tolist()
+        [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+
+    Source: `STEPS[step].source`.
     """
     checked = check_matrix(matrix)
     start = check_start(rotation, "rotation", (3, 3), checked)
@@ -99,31 +94,38 @@ def refine_quaternion_wxyz(
     escape: bool = False,
     derivative: str = "implicit",
 ) -> jax.Array:
-    """Moves a quaternion (w, x, y, z) towards the rotation nearest to a 3×3 matrix; see `refine_rotation`.
+    """Returns a unit quaternion (w, x, y, z) nearer to the nearest rotation of a 3×3 matrix, from a warm start.
+
+    The steps and their convergence are those of `refine_rotation`.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
-        quaternion_wxyz: The start, shape (..., 4), any length but 0; its batch axes broadcast against
-            those of `matrix`.
+        quaternion_wxyz: The start, shape (..., 4), any length but 0. The batch axes broadcast.
         step: A name in `STEPS`. Static.
-        iterations: How many steps, ≥ 0. Static.
-        escape: Leave an equilibrium that is not nearest, before the first step; the sign of a start that is turned is
-            free. Static.
+        iterations: Number of steps, ≥ 0. Static.
+        escape: Leave a start that is an equilibrium but not nearest. Static.
         derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:
         A unit quaternion, shape (..., 4) of the broadcast batch, dtype of `matrix`. Its sign continues that of the
-        start: it does not jump from frame to frame, and w may be negative.
+        start. So it does not jump from frame to frame, and w may be negative.
 
     Raises:
         ValueError: Wrong shape, unknown step or derivative, negative iterations.
         TypeError: Complex or non-numeric arrays, traced step, iterations, escape or derivative.
 
     Uniqueness:
-        As for `refine_rotation`.
+        As for `refine_rotation`. Where `escape` turns the start, the sign is arbitrary.
 
     Derivative:
         As for `refine_rotation`.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
+        >>> start = jnp.array([-0.6, -0.5, -0.5, -0.4])
+        >>> [round(x, 3) for x in jaxrot.refine_quaternion_wxyz(A, start, iterations=4).tolist()]
+        [-0.5, -0.5, -0.5, -0.5]
 
     Source: Müller et al. 2016, appendix D.
     """
@@ -151,10 +153,11 @@ def _checked_options(step: str, iterations: int, escape: bool, derivative: str) 
 @compiled
 def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Options) -> jax.Array:
     start = scaled(mat3.components(rotation))
-    # The shift is the scale c of the start c·Q, at least 2 after scaling. With another shift the columns are multiples
-    # of Q's quaternion at one scale only. A start of zeros has the shift 1 and becomes the identity.
+    # The shift is the scale c of the start c·Q, at least 2 after scaling. With a fixed shift the columns would be
+    # multiples of Q's quaternion at one scale only. A start of zeros has the shift 1 and becomes the identity.
     columns = quaternion.davenport_columns(start, nonzero_sqrt(mat3.squared_norm(start) / 3, smallest=1.0))
-    # Neither the length of this quaternion nor its sign matters.
+    # The length and the sign of this quaternion do not matter. The start is the quaternion of its largest column. So a
+    # tangent of the start that leaves the rotations has a derivative too, but no meaning.
     return mat3.stack(quaternion.to_orthonormal(_refine(matrix, quaternion.largest_column(columns), options)))
 
 
@@ -178,7 +181,7 @@ def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> Quaterni
 
 def _iterated(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, escape: bool) -> jax.Array:
     a = scaled(mat3.components(matrix))
-    # A loop's carry must be sharded as its result is, so a start that is not has to take it from the matrix.
+    # A loop needs a carry that is sharded like its result. Adding a 0 from the matrix gives the start that sharding.
     zero = a[0][0] * 0
     w, x, y, z = quaternion.components(wxyz)
     q = (w + zero, x + zero, y + zero, z + zero)
@@ -189,7 +192,7 @@ def _iterated(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, es
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))
 def _refined(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, escape: bool, order: int) -> jax.Array:
-    """The iteration, without its own derivative; `order` counts the derivatives taken, see `overflow.saturate`."""
+    """Runs the iteration; its derivative is the rule. `order` counts the derivatives taken, see `overflow.saturate`."""
     return _iterated(matrix, wxyz, step, iterations, escape)
 
 

@@ -1,4 +1,7 @@
-"""The singular value decomposition whose factors are rotations and whose last singular value carries the sign."""
+"""The singular value decomposition with rotations as factors: the last singular value has the sign of det A.
+
+The singular vectors are the eigenvectors of the stretch, by `eigh.eigen`.
+"""
 
 import functools
 from typing import NamedTuple
@@ -22,7 +25,7 @@ from jaxrot.solvers import DEFAULT_METHOD, METHODS
 
 @exportable
 class RotationVariantSVD(NamedTuple):
-    """A = left · diag(singular_values) · rightᵀ.
+    """The singular value decomposition A = left · diag(singular_values) · rightᵀ with rotations left and right.
 
     Attributes:
         left: U, shape (..., 3, 3), det U = +1.
@@ -36,38 +39,41 @@ class RotationVariantSVD(NamedTuple):
 
 
 def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
-    """The singular value decomposition A = U diag(s1, s2, s3) Vᵀ with rotations U and V.
+    """Returns the singular value decomposition A = U diag(s1, s2, s3) Vᵀ with rotations U and V.
 
-    U Vᵀ is the nearest rotation, V diag(s) Vᵀ the stretch. The sign of det A is in s3 and never in U or V, so that
-    nothing flips where a finite element is pressed through a plane.
+    U Vᵀ is the nearest rotation, V diag(s) Vᵀ the stretch. s3 has the sign of det A, so U and V stay rotations when a
+    finite element inverts.
 
     Args:
-        matrix: A, real, shape (..., 3, 3), any scale. float16 and bfloat16 are computed in float32, integers in the
-            default floating dtype.
+        matrix: A, real, shape (..., 3, 3), any scale.
 
     Returns:
-        (left, singular_values, right). With eps of the computing dtype: U and V orthogonal to 10 eps, A =
-        U diag(s) Vᵀ to 32 eps s1, s to 16 eps s1, while those are normal numbers. s is inf where it exceeds the dtype;
-        a matrix with NaN or inf gives NaN.
+        (left, singular_values, right). s is inf where it exceeds the dtype. A matrix with NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape.
         TypeError: Complex or non-numeric matrix.
 
     Uniqueness:
-        s is unique. U and V are unique up to the signs of two columns where the singular values differ; where two are
-        equal, or s2 = −s3, a plane of them may turn. They are the same for the same matrix in one compiled
-        program.
+        s is unique. U and V are unique up to the signs of two columns if the |sᵢ| differ. Where two are equal, their
+        vectors may turn in a plane. One compiled program returns the same U and V for the same matrix.
 
     Derivative:
-        Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ; where singular values are
-        equal that is the derivative along this U and V, one of many. U and V turn at rates over sᵢ−sⱼ and sᵢ+sⱼ; where
-        one of these is below about 64 eps tr S its part is damped to 0. So the derivative of a composition such as
-        U diag(φ(s)) Vᵀ or V diag(φ(s)) Vᵀ is wrong at equal and nearly equal singular values, although it exists: use
-        `isotropic_map`. For the rotation or the stretch alone use `nearest_rotation` or `polar_decomposition`.
+        Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ for the returned U and V.
+        The rates of U and V are over sᵢ−sⱼ and sᵢ+sⱼ, and damped to 0 where these are below about 64 eps tr S. So
+        U diag(φ(s)) Vᵀ and V diag(φ(s)) Vᵀ have a wrong derivative at equal and nearly equal singular values: use
+        `isotropic_map` or `polar_decomposition`.
 
-    Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention); the singular vectors are
-    the eigenvectors of the stretch, by `eigh.eigen`.
+    Accuracy:
+        A = U diag(s) Vᵀ to 32 eps s1 and s to 16 eps s1, if these are normal numbers. U and V are orthogonal to 10 eps.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.diag(jnp.array([1.0, -3.0, 2.0]))
+        >>> jaxrot.rotation_variant_svd(A).singular_values.round().astype(int).tolist()
+        [3, 2, -1]
+
+    Source: Müller et al. 2016, section 2, and Irving, Teran and Fedkiw 2004 (the convention).
     """
     return _rotation_variant_svd(check_matrix(matrix))
 
@@ -79,15 +85,15 @@ def _rotation_variant_svd(matrix: jax.Array) -> RotationVariantSVD:
 
 
 def signed_singular_values(matrix: ArrayLike) -> jax.Array:
-    """The singular values s1 ≥ s2 ≥ |s3| with the sign of det A in s3; those of `rotation_variant_svd` alone.
+    """Returns the singular values s1 ≥ s2 ≥ |s3| of a 3×3 matrix, with the sign of det A in s3.
 
-    Under `jit` the program holds neither U nor V, only what their derivative needs where it is taken.
+    They are those of `rotation_variant_svd`.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
 
     Returns:
-        s, shape (..., 3), dtype and unit of `matrix`, to 16 eps s1. A matrix with NaN or inf gives NaN.
+        s, shape (..., 3), dtype and unit of `matrix`. A matrix with NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape.
@@ -97,8 +103,20 @@ def signed_singular_values(matrix: ArrayLike) -> jax.Array:
         Unique.
 
     Derivative:
-        ṡᵢ = uᵢᵀ Ȧ vᵢ, see `rotation_variant_svd`. The gradient of a symmetric function of s is right. Its Hessian is
-        wrong at equal and nearly equal singular values, although it exists: use `isotropic_energy`.
+        ṡᵢ = uᵢᵀ Ȧ vᵢ, see `rotation_variant_svd`. The gradient of a symmetric function of s is right. Its Hessian
+        exists but is wrong at equal and nearly equal singular values: use `isotropic_energy`.
+
+    Accuracy:
+        16 eps s1.
+
+    Cost:
+        Under `jit` the program computes U and V only where their derivative needs them.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> A = jnp.diag(jnp.array([1.0, -3.0, 2.0]))
+        >>> jaxrot.signed_singular_values(A).round().astype(int).tolist()
+        [3, 2, -1]
 
     Source: as for `rotation_variant_svd`.
     """
@@ -112,9 +130,9 @@ def _signed_singular_values(matrix: jax.Array) -> jax.Array:
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(1,))
 def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """U, s, s of the normalised A, and V; `order` counts the derivatives taken, see `overflow.saturate`.
+    """Returns U, s, s of the normalised A, and V; `order` counts the derivatives taken, see `overflow.saturate`.
 
-    The normalised ones are what derivatives divide by. Their own derivative is saturated, that of s is not.
+    Derivatives divide by the normalised s. The derivative of the normalised s is saturated, that of s is not.
     """
     m = mat3.components(matrix)
     a = scaled(m)
@@ -122,7 +140,7 @@ def decomposed(matrix: jax.Array, order: int) -> tuple[jax.Array, jax.Array, jax
     values, axes = eigen(fusion_barrier(mat3.symmetric(mat3.transpose_multiply(rotation, a))))
     right = mat3.newton_schulz(mat3.transpose(axes))
     left = mat3.newton_schulz(mat3.multiply(rotation, right))
-    # Rounding may have left the order broken: s2 by a few eps below |s3|, or negative.
+    # Restore the order, which rounding may have broken: s2 may be a few eps below |s3|, or negative.
     s2 = jnp.maximum(values[1], jnp.abs(values[2]))
     s = fusion_barrier((jnp.maximum(values[0], s2), s2, values[2]))
     return mat3.stack(left), jnp.stack(unscaled(s, m), axis=-1), jnp.stack(s, axis=-1), mat3.stack(right)
@@ -160,7 +178,7 @@ class ReciprocalGaps(NamedTuple):
     Attributes:
         of_sums: Of s2+s3, s3+s1, s1+s2.
         of_differences: Of s2−s3, s3−s1, s1−s2.
-        norm: The largest modulus of the six. A constant to differentiation.
+        norm: The largest modulus of the six. It has no derivative.
     """
 
     of_sums: tuple[Complex, ...]
@@ -169,24 +187,24 @@ class ReciprocalGaps(NamedTuple):
 
     @property
     def over_sums(self) -> Vec3:
-        """One over the sums, damped: g/(g²+δ²)."""
+        """The damped reciprocals of the sums: g/(g²+δ²)."""
         return _real_parts(self.of_sums)
 
     @property
     def over_differences(self) -> Vec3:
-        """One over the differences, damped."""
+        """The damped reciprocals of the differences."""
         return _real_parts(self.of_differences)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
 def reciprocal_gaps(s: jax.Array, normalised: jax.Array, factor: jax.Array, order: int) -> ReciprocalGaps:
-    """The reciprocals; `order` is that of their derivative, see `overflow.saturate`.
+    """Returns the reciprocals of the sums and differences of the normalised singular values.
 
     Args:
-        s: The singular values, whose tangent is the one used.
-        normalised: Those of the normalised A, shape (..., 3).
-        factor: The power of two between the two.
-        order: How many derivatives have been taken before that of the reciprocals.
+        s: The singular values. The derivative uses their tangent, not that of the normalised ones.
+        normalised: The singular values of the normalised A, shape (..., 3).
+        factor: The power of two that normalises A.
+        order: The number of derivatives taken before that of the reciprocals, see `overflow.saturate`.
     """
     sums, differences, total = _sums_and_differences(normalised)
     delta = resolved_gap(total)
@@ -205,7 +223,8 @@ def _reciprocal_gaps_jvp(order: int, primals, tangents):
     delta_dot = resolved_gap(jnp.ones_like(total_dot)) * total_dot
 
     def tangent(inverse: Complex, gap_dot: jax.Array) -> Complex:
-        # As in `_derivative`: reverse mode meets each half of the gain before the square that overflows.
+        # Apply half of the gain on each side of the product, as in `_derivative`: reverse mode then meets one half
+        # before the square that would overflow.
         return multiply(times(inverse, -after), multiply(inverse, (gap_dot, delta_dot)))
 
     of_sums, of_differences = (

@@ -1,10 +1,7 @@
-"""Named families of 3×3 matrices, ordinary, extreme and adversarial, shared by the tests, the report and the notebooks.
+"""Named families of 3×3 matrices with known singular values, ordinary, extreme and adversarial.
 
-A family knows the signed singular values of what it samples, so the condition of each matrix is known without a solver.
-`sample(0)` is the empty batch, `sample(LARGE_BATCH)` one on the far side of an XLA fault, `poison` makes it non-finite.
-
-notation: s singular values s1 >= s2 >= |s3|, s3 < 0 iff the determinant is negative; R the nearest rotation;
-kappa = s1 / (s2 + s3), its condition number; eps = finfo(dtype).eps.
+notation: s are the signed singular values s1 >= s2 >= |s3|, with s3 < 0 iff the determinant is negative. R is the
+nearest rotation, kappa = s1 / (s2 + s3) its condition number, and eps = finfo(dtype).eps.
 """
 
 import zlib
@@ -20,13 +17,12 @@ LARGE_BATCH = 32_769  # jaxlib 0.10.2 on CPU gives wrong numbers for some fused 
 
 
 class Sample(NamedTuple):
-    """Matrices of one family.
+    """Matrices of one family, and their singular values.
 
     Attributes:
-        matrices: Shape (count, 3, 3), in the dtype asked for.
-        singular_values: Shape (count, 3), float64, signed. A prescribed spectrum is that before the one rounding to
-            dtype, which moves it by at most 2 eps s1. Others are LAPACK's, off by 18 float64 eps s1 at worst, and NaN
-            where the matrix is not finite.
+        matrices: Shape (count, 3, 3), in the requested dtype.
+        singular_values: Shape (count, 3), float64, signed. Prescribed, before the rounding that moves them by at most
+            2 eps s1, or from LAPACK, within 18 float64 eps s1. NaN where the matrix is not finite.
     """
 
     matrices: NDArray[np.floating]
@@ -34,7 +30,7 @@ class Sample(NamedTuple):
 
 
 class _Draw(NamedTuple):
-    """What a recipe draws from. Every method draws one number or matrix for each matrix of the sample."""
+    """The random numbers of a recipe. Every method draws one number or matrix for each matrix of the sample."""
 
     size: int
     dtype: np.dtype
@@ -65,20 +61,18 @@ class _Draw(NamedTuple):
 
 
 class Family(NamedTuple):
-    """A named family: `recipe` draws matrices, or the three entries of the diagonal in U diag(s) Vᵀ, or both."""
+    """A named family. `recipe` draws matrices, or the three entries of s in U diag(s) Vᵀ, or both, for each dtype."""
 
     name: str
     description: str
     recipe: Callable[[_Draw], NDArray | tuple | Sample]
 
     def sample(self, count: int, dtype: DTypeLike = np.float32, seed: int = 0) -> Sample:
-        """Draw `count` matrices in float32 or float64 (TypeError otherwise); same arguments, same matrices.
-
-        Scales and ranges of condition numbers follow the dtype. Families do not share random numbers.
-        """
+        """Returns `count` ≥ 0 matrices in float32 or float64, the same ones for the same arguments."""
         dtype = np.dtype(dtype)
         if dtype not in (np.float32, np.float64):
             raise TypeError(f"dtype must be float32 or float64, got {dtype}")
+        # The name in the seed: no two families share random numbers.
         draw = _Draw(count, dtype, np.random.default_rng([seed, zlib.crc32(self.name.encode())]))
         drawn = self.recipe(draw)
         if isinstance(drawn, Sample):
@@ -93,18 +87,20 @@ class Family(NamedTuple):
 
 
 def half_turn_starts(rotations: ArrayLike, axes: ArrayLike | None = None) -> NDArray[np.floating]:
-    """The starts from which an iteration on the torque does not move, half a turn away, and starts one ulp off them.
-
-    The torque vanishes at Q = R Rot(n, 180°) for each principal axis n of the stretch RᵀA.
+    """Returns rotations half a turn from R about a principal axis of RᵀA, where the torque is 0, and starts near them.
 
     Args:
         rotations: The nearest rotations R, shape (..., 3, 3), float32 or float64.
-        axes: The principal axes in the columns, shape (..., 3, 3). When absent those of A = R diag(s).
+        axes: The principal axes in the columns, shape (..., 3, 3); by default those of A = R diag(s).
 
     Returns:
-        Shape (9, ..., 3, 3): about each axis exactly 180°, then +eps, then -eps off about all three axes.
+        Shape (9, ..., 3, 3): exactly 180° about each axis, then the same turned by +eps and by -eps about all axes.
 
-    Source: Müller et al. 2016, eq. (8) and below, which knows the maxima only; there are saddles among them.
+    Example:
+        >>> half_turn_starts(np.eye(3))[0].diagonal().tolist()
+        [1.0, -1.0, -1.0]
+
+    Source: Müller et al. 2016, eq. (8) and below, which considers only maxima; some of these points are saddles.
     """
     rotations = np.asarray(rotations)
     axes = np.eye(3, dtype=np.longdouble) if axes is None else np.asarray(axes, np.longdouble)
@@ -118,7 +114,12 @@ def half_turn_starts(rotations: ArrayLike, axes: ArrayLike | None = None) -> NDA
 
 
 def poison(matrices: ArrayLike, seed: int = 0) -> NDArray[np.floating]:
-    """NaN, inf or -inf in one random entry of every third matrix of a (count, 3, 3) batch; the others bit for bit."""
+    """Returns a copy of a batch (count, 3, 3) with NaN, inf or -inf in one random entry of every third matrix.
+
+    Example:
+        >>> np.isfinite(poison(np.ones((4, 3, 3)))).all(axis=(1, 2)).tolist()
+        [False, True, True, False]
+    """
     poisoned = np.array(matrices)
     matrix = np.arange(0, len(poisoned), 3)
     row, column = np.random.default_rng(seed).integers(0, 3, (2, len(matrix)))
@@ -127,7 +128,7 @@ def poison(matrices: ArrayLike, seed: int = 0) -> NDArray[np.floating]:
 
 
 def _rotation_from_quaternion(wxyz: ArrayLike) -> NDArray[np.longdouble]:
-    """Rotations from quaternions of any length but 0, shape (4, count), orthogonal to the last digit of long double."""
+    """Rotations from quaternions of any length but 0, shape (4, count), orthogonal up to rounding in long double."""
     w, x, y, z = np.asarray(wxyz, np.longdouble)
     s = 2 / (w * w + x * x + y * y + z * z)
     rows = (
@@ -139,7 +140,7 @@ def _rotation_from_quaternion(wxyz: ArrayLike) -> NDArray[np.longdouble]:
 
 
 def _composed(left: NDArray, diagonal: tuple, right: NDArray, draw: _Draw) -> Sample:
-    """U diag(s) Vᵀ, formed in long double and rounded once; s in any order and with any signs."""
+    """U diag(s) Vᵀ, computed in long double and rounded once; s in any order and with any signs."""
     entries = np.stack([np.broadcast_to(np.asarray(s, np.longdouble), draw.size) for s in diagonal], -1)
     values = -np.sort(-np.abs(entries), axis=-1)
     values[:, 2] *= np.where((entries < 0).sum(-1) % 2, -1, 1)
@@ -148,7 +149,7 @@ def _composed(left: NDArray, diagonal: tuple, right: NDArray, draw: _Draw) -> Sa
 
 
 def _scaled(draw: _Draw, float32: ArrayLike, float64: ArrayLike) -> tuple:
-    """Well-conditioned spectra, half of them inverted, at the scales of the dtype in turn."""
+    """Well-conditioned spectra, half of them inverted, that cycle through the scales given for the dtype."""
     scale = np.resize(np.asarray(float32 if draw.dtype == np.float32 else float64, np.longdouble), draw.size)
     return scale, scale * draw.uniform(0.5, 1), scale * draw.signed(0.1, 0.4)
 
@@ -165,13 +166,13 @@ def _noisy(draw: _Draw, noise: ArrayLike, sign: int = 1) -> NDArray:
 
 
 def _with_gap(draw: _Draw, gap: NDArray) -> tuple:
-    """Spectra with s1 = 1 and s2 + s3 = gap, s2 uniform over all that this allows."""
+    """Spectra with s1 = 1 and s2 + s3 = gap, s2 uniform over all possible values."""
     s2 = gap / 2 + (1 - gap / 2) * draw.uniform(0, 1)
     return 1, s2, np.asarray(gap, np.longdouble) - s2
 
 
 def _inverted(matrices: NDArray) -> NDArray:
-    """The matrices or their negatives, whichever have a negative determinant."""
+    """Of each matrix and its negative the one with a negative determinant."""
     return matrices * -np.sign(np.linalg.det(matrices))[:, None, None]
 
 

@@ -1,4 +1,4 @@
-"""Complex numbers as pairs of real arrays, which fuse like everything else."""
+"""Complex numbers as pairs of real arrays, which XLA fuses like other real arithmetic."""
 
 import jax
 

@@ -1,4 +1,4 @@
-"""Rotations in a coordinate plane, and what is built of them: eigenvectors and singular value decompositions."""
+"""Plane rotations, and eigenvectors and singular value decompositions by products of them."""
 
 import jax
 import jax.numpy as jnp
@@ -12,23 +12,23 @@ from jaxrot._algebra.select import constant_like, sign_of
 # notation: a plane rotation is (c, s), cosine and sine; it takes the pair (x, y) to (c x + s y, c y − s x).
 PlaneRotation = tuple[jax.Array, jax.Array]
 
-# As many as in Müller et al. 2016, appendix C.
+# The number in Müller et al. 2016, appendix C.
 _EIGEN_ROTATIONS = 10
 
 
 def rotate(r: PlaneRotation, x: jax.Array, y: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """The pair (x, y) in the rotated axes."""
+    """Returns the pair (x, y) in the rotated axes."""
     c, s = r
     return c * x + s * y, c * y - s * x
 
 
 def compose(p: PlaneRotation, q: PlaneRotation) -> PlaneRotation:
-    """Both rotations, in either order."""
+    """Returns the product of two plane rotations, which commute."""
     return p[0] * q[0] - p[1] * q[1], p[0] * q[1] + p[1] * q[0]
 
 
 def rotate_rows(r: PlaneRotation, m: Mat3, i: int, j: int) -> Mat3:
-    """The rotation in the plane of rows i and j; on a matrix that is kept transposed, of columns."""
+    """Rotates rows i and j of a matrix. If the matrix is stored transposed, these are its columns."""
     rows = list(m)
     pairs = [rotate(r, x, y) for x, y in zip(m[i], m[j], strict=True)]
     rows[i] = (pairs[0][0], pairs[1][0], pairs[2][0])
@@ -37,14 +37,14 @@ def rotate_rows(r: PlaneRotation, m: Mat3, i: int, j: int) -> Mat3:
 
 
 def rolled(condition: jax.Array, m: Mat3) -> Mat3:
-    """The rows in the order (1, 2, 0) where `condition` holds: a rotation of the frame, whose determinant is +1."""
+    """Permutes the rows to the order (1, 2, 0) where `condition` holds: a cyclic permutation, of determinant +1."""
     return mat3.where(condition, (m[1], m[2], m[0]), m)
 
 
 def givens(x: jax.Array, y: jax.Array) -> PlaneRotation:
-    """The rotation that takes (x, y) to (r, 0), r ≥ 0; the identity where both are negligible beside 1.
+    """The rotation that takes (x, y) to (r, 0), r ≥ 0. It is the identity where both are negligible compared with 1.
 
-    Below √(tiny/eps) the squares lose digits or vanish, one before the other, and (c, s) would be no rotation.
+    Below √(tiny/eps) the squares lose digits or underflow, the smaller one first, and (c, s) would not be a rotation.
     """
     info = jnp.finfo(x.dtype)
     square = x * x + y * y
@@ -55,13 +55,13 @@ def givens(x: jax.Array, y: jax.Array) -> PlaneRotation:
 
 
 def diagonalising(xx: jax.Array, xy: jax.Array, yy: jax.Array) -> tuple[PlaneRotation, jax.Array]:
-    """The rotation, by at most 45°, to the axes of the symmetric matrix ((xx, xy), (xy, yy)), and its tangent t.
+    """The rotation by at most 45° that diagonalises the symmetric matrix ((xx, xy), (xy, yy)), and its tangent t.
 
-    There the entries are xx + t xy, 0 and yy − t xy.
+    The diagonal entries are then xx + t xy and yy − t xy.
     """
     difference = xx - yy
     double = 2 * xy
-    # Where the matrix is a multiple of 1 the root has no derivative; 0 stands for it, not NaN.
+    # The root has no derivative where the matrix is a multiple of 1. `safe_sqrt` gives 0 there instead of NaN.
     root = safe_sqrt(difference * difference + double * double)
     t = safe_divide(jnp.where(difference < 0, -double, double), jnp.abs(difference) + root)
     c = 1 / jnp.sqrt(t * t + 1)
@@ -69,9 +69,10 @@ def diagonalising(xx: jax.Array, xy: jax.Array, yy: jax.Array) -> tuple[PlaneRot
 
 
 def svd_2x2(xx: jax.Array, xy: jax.Array, yx: jax.Array, yy: jax.Array) -> tuple[PlaneRotation, PlaneRotation]:
-    """The rotations of the rows and of the columns of ((xx, xy), (yx, yy)) that make it diagonal.
+    """The rotations of the rows and of the columns that make ((xx, xy), (yx, yy)) diagonal.
 
-    One rotation of the rows makes it symmetric, its polar decomposition; then both turn to the axes.
+    First a rotation of the rows makes the matrix symmetric (its polar decomposition). Then rows and columns are rotated
+    to the eigenvectors.
     """
     polar = givens(xx + yy, yx - xy)
     (a, c), (b, d) = rotate(polar, xx, yx), rotate(polar, xy, yy)
@@ -80,20 +81,20 @@ def svd_2x2(xx: jax.Array, xy: jax.Array, yx: jax.Array, yy: jax.Array) -> tuple
 
 
 def symmetric_eigen(m: Mat3) -> tuple[Vec3, Mat3]:
-    """The eigenvalues of a symmetric matrix, in no order, and its eigenvectors as rows, which make a rotation.
+    """Returns the eigenvalues of a symmetric matrix, in no order, and its eigenvectors as rows of a rotation.
 
-    Ten Jacobi rotations, each in the plane of the largest entry off the diagonal. Instead of gathering that entry the
-    frame is rolled until it stands at (0, 1). Absolute accuracy: a few eps of the largest eigenvalue.
+    Ten Jacobi rotations, each in the plane of the largest off-diagonal entry. Instead of a gather, the rows are
+    permuted until that entry is at (0, 1). The absolute error is a few eps of the largest eigenvalue.
 
     Cost: 370 flops, 20 square roots and as many divisions.
-    Source: Jacobi 1846; Müller et al. 2016, appendix C, where an entry below 1e-15 ends the loop. Here one below a
-    quarter eps of the trace counts as zero: to turn by angles that are nothing but rounding costs twice the error at
-    multiples of a rotation.
+    Source: Jacobi 1846; Müller et al. 2016, appendix C, where an entry below 1e-15 ends the loop. Here an entry below a
+    quarter eps of the trace counts as zero. Rotating by angles that are only rounding doubles the error at multiples
+    of a rotation.
     """
 
     def step(_, state: tuple[Vec3, Vec3, Mat3]) -> tuple[Vec3, Vec3, Mat3]:
         (xx, yy, zz), (yz, xz, xy), axes = state
-        # Rolled once where the largest is yz, twice where it is xz.
+        # Permute once if the largest entry is yz, twice if it is xz.
         roll_twice = (jnp.abs(xz) > jnp.abs(xy)) & (jnp.abs(xz) >= jnp.abs(yz))
         roll = roll_twice | (jnp.abs(yz) > jnp.abs(xy))
         diagonal_and_rest: Mat3 = ((xx, yz, zero), (yy, xz, zero), (zz, xy, zero))
@@ -113,13 +114,13 @@ def symmetric_eigen(m: Mat3) -> tuple[Vec3, Mat3]:
 
 
 def ordered_svd(left: Mat3, diagonal: Vec3, right: Mat3) -> tuple[Mat3, Vec3, Mat3]:
-    """Sorts the parts of A = left diag(d) rightᵀ by |d| and leaves one sign, that of det A, in the smallest.
+    """Sorts A = left diag(d) rightᵀ by |d|, and moves all signs to the smallest entry: the sign of det A.
 
     Args:
         left: A rotation, transposed: its columns as rows.
-        diagonal: d in any order and with any signs. It must come out of a loop: what is computed in the open XLA
-            computes again for every result, not always with the same rounding, and of two equal singular values left
-            and right would put different ones first. (`lax.optimization_barrier` is gone before XLA:CPU fuses.)
+        diagonal: d in any order and with any signs. It must be the result of a loop. XLA recomputes other expressions
+            for every result, not always with the same rounding. For two equal singular values left and right could then
+            be sorted differently. (`lax.optimization_barrier` does not help: it is removed before XLA:CPU fuses.)
         right: A rotation, transposed.
 
     Returns:
@@ -131,7 +132,7 @@ def ordered_svd(left: Mat3, diagonal: Vec3, right: Mat3) -> tuple[Mat3, Vec3, Ma
         is_smaller = jnp.abs(d[i]) < jnp.abs(d[j])
         d[i], d[j] = jnp.where(is_smaller, d[j], d[i]), jnp.where(is_smaller, d[i], d[j])
         for axes in (u, v):
-            # Exchanged by a quarter turn, so that the determinant stays +1.
+            # Exchange by a quarter turn: the determinant stays +1.
             opposite = mat3.scale_vector(axes[i], -1.0)
             axes[i], axes[j] = mat3.where(is_smaller, axes[j], axes[i]), mat3.where(is_smaller, opposite, axes[j])
     for i in (0, 1):

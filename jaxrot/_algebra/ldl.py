@@ -1,7 +1,7 @@
-"""Solving with symmetric positive semidefinite 3×3 matrices.
+"""Linear systems with symmetric positive semidefinite 3×3 matrices.
 
-LDLᵀ without pivoting is backward stable where the matrix is semidefinite, so that nothing is chosen or exchanged. The
-unknowns end in quotients: what is rounding in one of them is then the same rounding wherever it is used.
+LDLᵀ without pivoting is backward stable for a semidefinite matrix, so no rows are selected or exchanged. Each unknown
+is the result of a division. XLA:CPU does not recompute divisions, so every use of an unknown sees the same rounding.
 """
 
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from jaxrot._algebra.mat3 import Mat3, Vec3
 
 
 def solve(h: Mat3, v: Vec3) -> Vec3:
-    """h⁻¹ v for a positive definite h; a pivot below eps·tr h is rounding and taken for that."""
+    """Returns h⁻¹ v for a positive definite h. A pivot below eps·tr h is rounding, and is replaced by eps·tr h."""
     (h00, h01, h02), (_, h11, h12), (_, _, h22) = h
     v0, v1, v2 = v
     smallest = float(jnp.finfo(h00.dtype).eps) * (h00 + h11 + h22)

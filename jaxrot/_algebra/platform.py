@@ -1,4 +1,4 @@
-"""The platform that a program is written for when it is traced."""
+"""The platform for which a program is optimised while it is traced."""
 
 import jax
 
@@ -6,8 +6,8 @@ import jax
 def platform() -> str:
     """The platform of JAX's default device: "cpu", "gpu", "tpu" or another one.
 
-    A program that is then run elsewhere, as by `jax.export`, gives the same results; it is only cut for the wrong
-    compiler.
+    A program that runs on another platform, for example after `jax.export`, gives the same results. It is only
+    optimised for the wrong compiler.
     """
     device = jax.config.jax_default_device  # pyright: ignore[reportAttributeAccessIssue]
     if device is None:

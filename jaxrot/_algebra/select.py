@@ -6,15 +6,15 @@ from jax import lax
 
 
 def is_positive(x: jax.Array) -> jax.Array:
-    """Whether x > 0."""
+    """Whether x > 0, from a quotient, which XLA:CPU does not recompute."""
     return x / (jnp.abs(x) + float(jnp.finfo(x.dtype).tiny)) > 0
 
 
 def constant_like(x: jax.Array, value: float) -> jax.Array:
-    """An array of one value that is batched and sharded as x is, also inside `vmap`; NaN where x is.
+    """Returns an array of one value that is batched and sharded like x, also inside `vmap`. It is NaN where x is.
 
-    `jnp.full_like` is not batched inside `vmap`. A choice between two such constants, a stack of them or a loop that
-    starts from one fails on a mesh with Explicit axes on jax 0.10.
+    `jnp.full_like` is not batched inside `vmap`. On jax 0.10 and a mesh with Explicit axes such constants fail if two
+    of them are selected from, if they are stacked, or if a loop starts from one.
     """
     constant = x.dtype.type(value)
     return lax.clamp(constant, lax.stop_gradient(x), constant)
@@ -32,8 +32,9 @@ def exchange(condition: jax.Array, a: jax.Array, b: jax.Array) -> tuple[jax.Arra
 
 
 def index_of_largest(values: tuple[jax.Array, ...]) -> jax.Array:
-    """The index of the largest value, the first of equal ones, as a floating-point number."""
-    # The derivative of a maximum is such a choice between constants; an index has none.
+    """The index of the largest value, the first if several are equal, as a floating-point number."""
+    # An index has no derivative. Without this line the derivative of a maximum selects between constants, which fails
+    # on a mesh with Explicit axes, see `constant_like`.
     values = lax.stop_gradient(values)
     best, index = values[0], constant_like(values[0], 0)
     for i, value in enumerate(values[1:], start=1):

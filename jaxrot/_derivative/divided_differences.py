@@ -1,7 +1,8 @@
-"""Divided differences of a function of the singular values, without cancellation where two of them meet.
+"""Divided differences of a function of the singular values, without cancellation at equal singular values.
 
 A permutation of the arguments of φ permutes its results. So φᵢ − φⱼ vanishes at sᵢ = sⱼ, and the divided difference is
-the mean of a derivative of φ on the way there. The same is true of sums at sᵢ = −sⱼ if the map is smooth there.
+the mean of a derivative of φ on the path from there to s. The same holds for sums at sᵢ = −sⱼ if the map is smooth
+there.
 """
 
 import functools
@@ -16,20 +17,20 @@ from jax import lax
 from jaxrot._algebra.mat3 import Vec3
 from jaxrot._derivative.rule import resolved_gap
 
-# The planes (y, z), (z, x), (x, y), in the order of the axes across them.
+# The planes (y, z), (z, x), (x, y), in the order of their normals.
 PLANES = ((1, 2), (2, 0), (0, 1))
 
-# The mean is used where it agrees with the quotient up to this many eps of what was subtracted.
+# The mean is used where it agrees with the quotient up to this many eps of the operands of the subtraction.
 _AGREEMENT = 32
 # Two singular values are equal up to this many eps.
 _EQUAL = 64
-# Nodes of the quadrature by Gauss and Legendre on the positive half: exact to rounding for a smooth function and a path
-# up to half as long as the singular values.
+# Positive nodes of the Gauss-Legendre quadrature. It is exact up to rounding for a smooth function and a path up to
+# half as long as the singular values.
 _NODES = {"float32": 2, "float64": 4}
 
 
 class DividedDifferences(NamedTuple):
-    """For each of `PLANES`, i and j.
+    """The divided differences for each pair (i, j) of `PLANES`.
 
     Attributes:
         over_differences: (φᵢ − φⱼ)/(sᵢ − sⱼ).
@@ -43,16 +44,16 @@ class DividedDifferences(NamedTuple):
 def divided_differences(
     function: Callable[[jax.Array], jax.Array], s: jax.Array, phi: jax.Array, *, is_even: bool
 ) -> DividedDifferences:
-    """The divided differences of φ at s.
+    """Returns the divided differences of φ at s.
 
     Args:
-        function: φ, from arrays of shape (..., 3) to such arrays, also for more batch axes than s has.
+        function: φ, from arrays of shape (..., 3) to such arrays. It is called with more batch axes than s has.
         s: The singular values, shape (..., 3).
         phi: φ(s).
-        is_even: φ belongs to a map that does not change with the signs of two singular values, static.
+        is_even: Whether the map of φ does not change if two singular values change their signs. Static.
     """
     sign = -1 if is_even else 1
-    # The last factor of 16 of the range counts as one value, so that no sum overflows.
+    # Clamp values within a factor of 16 of the largest number: otherwise the sums overflow.
     largest = jnp.finfo(s.dtype).max / 16
     s = lax.clamp(-largest, s, largest)
     slopes_over_differences, slopes_over_sums = _mean_slopes(function, s, sign)
@@ -73,15 +74,16 @@ def divided_differences(
 
 
 def _mean_slopes(function: Callable[[jax.Array], jax.Array], s: jax.Array, sign: int) -> tuple[jax.Array, jax.Array]:
-    """For each plane, half of the mean derivative of φᵢ − φⱼ along eᵢ − eⱼ, and of φᵢ ± φⱼ along eᵢ + eⱼ.
+    """Returns, for each plane, half of the mean derivative of φᵢ − φⱼ along eᵢ − eⱼ, and of φᵢ ± φⱼ along eᵢ + eⱼ.
 
-    The paths lead to s, from where sᵢ = sⱼ and from where sᵢ = −sⱼ.
+    The paths start where sᵢ = sⱼ and where sᵢ = −sⱼ, and end at s.
     """
     starts, directions = [], []
     for i, j in PLANES:
         si, sj = s[..., i], s[..., j]
         mean, half = 0.5 * (si + sj), 0.5 * (si - sj)
-        # With two values of one sign the path would lead to where φ may not be defined, and the quotient is accurate.
+        # If two values have the same sign, the path would cross points where φ may be undefined. The quotient is
+        # accurate there, and the path is left out.
         is_opposite = si * sj <= 0
         starts.append(_with(s, (i, j), (mean, mean)))
         starts.append(_with(s, (i, j), (jnp.where(is_opposite, half, si), jnp.where(is_opposite, -half, sj))))
@@ -110,7 +112,7 @@ def _with(s: jax.Array, plane: tuple[int, int], values: tuple[jax.Array, jax.Arr
 
 
 def _agrees(numerator: jax.Array, gap: jax.Array, slope: jax.Array, size: jax.Array, length: jax.Array) -> jax.Array:
-    """Whether slope times gap is the numerator, up to its rounding and that of the singular values."""
+    """Whether slope times gap equals the numerator up to the rounding of φ and of the singular values."""
     rounding = _AGREEMENT * float(jnp.finfo(gap.dtype).eps) * (size + jnp.abs(slope) * length)
     return jnp.abs(numerator - gap * slope) <= rounding
 

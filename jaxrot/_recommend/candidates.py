@@ -1,4 +1,4 @@
-"""What can be recommended: the methods whose domain holds the sample, and the steps; how wrong, and how fast."""
+"""The candidates of `recommend`: methods whose domain holds the matrices, and steps, with their error and time."""
 
 import functools
 from collections.abc import Callable
@@ -20,28 +20,28 @@ from jaxrot.measuring.timing import Compiled, compile_method, time_methods
 from jaxrot.measuring.words import number
 from jaxrot.solvers import Method
 
-# s2 + s3 ≥ s1: an approximation is for matrices near a rotation, κ = 1/2, and at κ = 1 half of the way is left.
+# The largest κ for an approximation: s2 + s3 ≥ s1. Approximations are for matrices near a rotation, κ = 1/2.
 APPROXIMATION_LIMIT = 1.0
-# Degrees from the start to R*, where a step's record bounds them. The error of one `quest` step was 3e-5 from 170° off
-# and 3e-2 from 179° off, in float32.
+# The largest angle from the start to R*, in degrees, for steps that have a limit. The error of one float32 `quest` step
+# was 3e-5 from 170° off and 3e-2 from 179° off.
 FARTHEST_START = {"cayley": 90.0, "quest": 170.0}
 MOST_ITERATIONS = 8
-# A batch is as large as the sample, but not so small that the time of a call hides that of its work.
+# A batch has the size of the sample within these limits. In smaller batches the overhead of a call dominates.
 SMALLEST_BATCH, LARGEST_BATCH = 10_000, 100_000
 TIMING_BUDGET_S = 1.0
 
 
 class Candidate(NamedTuple):
-    """A method, or a step and how often, with what was measured of it.
+    """A method, or a step and its number of iterations, with its measurements.
 
     Attributes:
-        name: The method's, or the step's and the number of iterations.
+        name: The method, or the step and the number of iterations.
         method: A name in `METHODS`, or None for a step.
         step: A name in `STEPS`, or None for a method.
-        iterations: How many steps, or None for a method.
-        error: The largest error ‖R − R*‖_F on the sample; inf where a result is no number.
-        time_ns: Median time a matrix in ns; NaN where it was not timed, because the error is too large.
-        time_quartiles_ns: The quartiles beside the median; NaN likewise.
+        iterations: Number of steps, or None for a method.
+        error: The largest error ‖R − R*‖_F on the sample; inf if a result is NaN or infinite.
+        time_ns: Median time a matrix in ns; NaN if it was not timed because the error is too large.
+        time_quartiles_ns: The quartiles of that time, or NaN.
     """
 
     name: str
@@ -54,14 +54,14 @@ class Candidate(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A candidate and its program for the sample's batch."""
+    """A candidate and its compiled program for the batch size of the sample."""
 
     candidate: Candidate
     compiled: Compiled
 
 
 class Apply(functools.partial):
-    """A function with its options, shown as the call it makes."""
+    """A function with its options, printed as the call that it makes."""
 
     def __repr__(self) -> str:
         options = ", ".join(f"{name}={value!r}" for name, value in self.keywords.items())
@@ -69,7 +69,7 @@ class Apply(functools.partial):
 
 
 def apply_of(candidate: Candidate, *, takes_previous: bool) -> Apply:
-    """The function to call: of a matrix, or of a matrix and the previous rotation."""
+    """Returns the function to call: of a matrix, or of a matrix and the previous rotation."""
     if candidate.method is None:
         return Apply(refine_rotation, step=candidate.step, iterations=candidate.iterations)
     return Apply(nearest_rotation_from_cold if takes_previous else nearest_rotation, method=candidate.method)
@@ -84,17 +84,27 @@ def nearest_rotation_from_cold(matrix: ArrayLike, rotation: ArrayLike, *, method
 
 
 def outside_domain(method: Method, sample: Sample) -> str | None:
-    """Why a method is not for matrices like these, in words, or None; see `recommend` for the rule."""
+    """Returns why the domain of a method does not hold all finite matrices, in words, or None if it does.
+
+    The check uses all finite matrices in float64, not only the sample. A method is excluded, however small its error:
+
+    - if `handles_inversion` is False and some det A is negative, or 0 up to rounding.
+    - if it is exact and some κ = s1/(s2+s3) is larger than its `condition_limit`. Up to that limit it was found to keep
+      an accuracy of a few eps. A limit of 0 means at no κ: such methods are never recommended. A limit of 1/(8 eps)
+      excludes nothing.
+    - if it is an approximation and some κ > 1, that is s2+s3 < s1. Approximations are for matrices near a rotation,
+      κ = ½. They declare no limit in units of eps, because their error is not rounding.
+    """
     if not method.handles_inversion and sample.not_upright:
         return f"for det A > 0, and {sample.not_upright:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
     limit = method.condition_limit[sample.dtype]
     largest = sample.largest_condition
-    # At a limit this high nothing is left out, matrices without a unique R* included.
+    # At a limit this high nothing is excluded, not even matrices without a unique R*.
     if limit >= domain.largest_condition(sample.dtype):
         return None
     if method.exact and limit == 0:
         return "exact, but for no κ does it declare an error of a few eps"
-    # To rounding: a rotation is one, κ = 1/2, with the digits that its dtype has.
+    # Allow for rounding: the κ of a rounded rotation is 1/2 only up to a few eps.
     rounding = 1 + 8 * float(np.finfo(sample.dtype).eps)
     if method.exact and largest > limit * rounding:
         return f"declared for κ ≤ {number(limit)}, and κ is up to {_larger(largest, limit)}"
@@ -105,7 +115,10 @@ def outside_domain(method: Method, sample: Sample) -> str | None:
 
 
 def start_outside_domain(step: str, sample: Sample) -> str | None:
-    """Why a step does not get on from these starts, in words, or None."""
+    """Returns why a step cannot start from the starts of the sample, in words, or None if it can.
+
+    `cayley` is excluded if a start is more than 90° off, `quest` from 170° on. Steps declare no κ.
+    """
     farthest = FARTHEST_START.get(step)
     if sample.starts is None or farthest is None:
         return None
@@ -121,17 +134,17 @@ def measure_method(name: str, sample: Sample) -> Measured:
 
 
 def measure_step(step: str, sample: Sample, largest_error: float) -> Measured:
-    """Finds the smallest number of iterations whose error is small enough, or the best number up to the most."""
+    """Finds the smallest number of iterations whose error is small enough, else the number with the smallest error."""
     once = _measure(_step(step, 1), sample)
     errors = [once.candidate.error]
-    # One program, applied again and again, finds the number; a program for each number would take a second each.
+    # Apply one program repeatedly to find the number. Compiling a program for each number would take a second each.
     rotation = _run(once.compiled, sample, sample.starts)
     while errors[-1] > largest_error and len(errors) < MOST_ITERATIONS:
         rotation = _run(once.compiled, sample, rotation)
         errors.append(error_on(rotation, sample.judged))
     iterations = len(errors) if errors[-1] <= largest_error else int(np.argmin(errors)) + 1
     found = once if iterations == 1 else _measure(_step(step, iterations), sample)
-    # The program for that number rounds in another place: at the edge it may take one iteration more.
+    # The program for that number rounds differently. With an error close to the limit it may need another iteration.
     while found.candidate.error > largest_error >= errors[-1] and iterations < MOST_ITERATIONS:
         iterations += 1
         found = _measure(_step(step, iterations), sample)
@@ -139,7 +152,7 @@ def measure_step(step: str, sample: Sample, largest_error: float) -> Measured:
 
 
 def time_candidates(measured: list[Measured], sample: Sample) -> list[Candidate]:
-    """The candidates with their times, measured side by side, the fastest first."""
+    """Returns the candidates with their times, measured interleaved, the fastest first."""
     candidates = {entry.candidate.name: entry.candidate for entry in measured}
     timings = time_methods(
         {entry.candidate.name: entry.compiled for entry in measured},
@@ -157,21 +170,21 @@ def time_candidates(measured: list[Measured], sample: Sample) -> list[Candidate]
 
 
 def batch_size(sample: Sample) -> int:
-    """Matrices in a call that is timed."""
+    """The number of matrices in a timed call."""
     return min(max(sample.finite, SMALLEST_BATCH), LARGEST_BATCH)
 
 
 def undetermined(sample: Sample) -> int:
-    """Matrices of the sample whose error is not defined."""
+    """The number of matrices of the sample whose error is not defined."""
     judged = sample.judged
     return int(np.sum(~judged.is_normal | (judged.condition >= domain.largest_condition(sample.dtype))))
 
 
 def error_on(rotation: np.ndarray, judged: Judged) -> float:
-    """The largest error ‖R − R*‖_F.
+    """Returns the largest error ‖R − R*‖_F.
 
-    Where R* is not determined, κ ≥ 1/(8 eps), an R that is no rotation counts with ‖RᵀR − 1‖_F, and one that loses
-    trace with the smallest error that loses as much: lost trace ≤ s1 ‖R − R*‖²/2. What rounding explains counts 0.
+    Where R* is not determined, κ ≥ 1/(8 eps), the error is the larger of two numbers: the defect ‖RᵀR − 1‖_F, and the
+    smallest error that loses as much trace, by lost trace ≤ s1 ‖R − R*‖²/2. Each counts 0 if rounding explains it.
     """
     errors = measure_errors(rotation, judged)
     eps = float(np.finfo(judged.matrices.dtype).eps)
@@ -200,14 +213,14 @@ def _run(compiled: Compiled, sample: Sample, starts: np.ndarray | None) -> np.nd
 
 
 def _larger(value: float, limit: float) -> str:
-    """A value with enough digits to be seen to be larger than the limit."""
+    """The value with enough digits to differ from the limit when printed."""
     return number(value) if number(value) != number(limit) else f"{value:.8g}"
 
 
 def _largest_angle(starts: np.ndarray, judged: Judged) -> float:
-    """Degrees from a start to R*, at most, where R* is determined."""
+    """The largest angle from a start to R*, in degrees, over the matrices whose R* is determined."""
     where = judged.condition < domain.largest_condition(judged.matrices.dtype.name)
     distance = reference.forward_error(starts, judged.matrices, reference=judged.solution)
-    # ‖R − R*‖_F = 2√2 sin(θ/2); a start that drifted may be longer than that.
+    # ‖R − R*‖_F = 2√2 sin(θ/2). For a start that has drifted off the rotations it may be larger, hence the minimum.
     largest = np.max(distance, where=where, initial=0)
     return float(np.degrees(2 * np.arcsin(min(1.0, largest / 8**0.5))))

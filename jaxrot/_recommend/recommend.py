@@ -1,4 +1,4 @@
-"""The cheapest way to the nearest rotation that is accurate enough, measured on the user's own matrices."""
+"""`recommend`: the cheapest method that is accurate enough, measured on the user's own matrices."""
 
 from collections.abc import Callable
 
@@ -13,53 +13,45 @@ from jaxrot._recommend.sample import Sample, take_sample
 from jaxrot.solvers import METHODS
 from jaxrot.steps import STEPS
 
-# What is recommended keeps this much of the tolerance free, for the matrices that the sample does not hold.
+# A recommended candidate has an error of at most tolerance / MARGIN: matrices outside the sample may have a larger one.
 MARGIN = 2.0
 
 
 def recommend(
     matrices: ArrayLike, *, tolerance: float, previous: ArrayLike | None = None, dtype: DTypeLike | None = None
 ) -> Recommendation:
-    """Measures what can find the nearest rotations of these matrices, and recommends the cheapest that is good enough.
-
-    It compiles up to twenty programs and runs them: some seconds to half a minute, once, outside `jit`.
+    """Returns the fastest method that finds the nearest rotations of these matrices to a tolerance, by measurement.
 
     Args:
-        matrices: A, real, shape (..., 3, 3), any scale: matrices like those that are to come. Of more than 10,000 a
-            random sample is measured, with the 100 largest κ and the 100 smallest s3/s1 in it.
-        tolerance: The largest error ‖R − R*‖_F that is good enough, > 0; about √2 times an angle in radians.
-        previous: Rotations to start from, shape (..., 3, 3), broadcast against `matrices`: those of the last frame.
-            With them the steps of `refine_rotation` are candidates too, with 1 to 8 iterations and without `escape`.
-        dtype: float32 or float64, what to compute in; that of `matrices` by default. Half precision is computed and
-            judged in float32, and its results are rounded after that.
+        matrices: A, real, shape (..., 3, 3), any scale: matrices like those to come. Of more than 10,000 a random
+            sample is measured, with the 100 largest κ = s1/(s2+s3) and the 100 smallest s3/s1 in it.
+        tolerance: The largest acceptable error ‖R − R*‖_F, > 0, R* the nearest rotation; about √2 times an angle in
+            radians.
+        previous: Rotations to start from, broadcast against `matrices`. With them the steps of `refine_rotation` are
+            candidates too, with 1 to 8 iterations and without `escape`.
+        dtype: float32 or float64; by default that of `matrices`. Half precision is measured in float32, unrounded.
 
     Returns:
-        The fastest candidate whose largest error on the sample is at most tolerance / 2; of those whose median time is
-        within its upper quartile, the one with the smallest error. Where nothing meets that, `meets` is
-        False and it is the candidate with the smallest error. Times differ from run to run, and a choice between
-        candidates that take about the same time with them.
-
-    Domain:
-        Measured errors decide what is accurate enough. What a method declares in `METHODS` decides whether the sample
-        is one it is made for; this is asked of *all* finite matrices given, in float64, and a method that one of them
-        leaves is not recommended, however small its error:
-
-        - A method with `handles_inversion` False, where det A is negative, or 0 to rounding.
-        - An exact method, where κ = s1/(s2+s3) is larger than its `condition_limit`: that is as far as it was found to
-          keep its accuracy of a few eps. Those with limit 0 were found to keep it nowhere, and are never recommended.
-          A limit of 1/(8 eps) leaves nothing out.
-        - An approximation, where κ > 1, that is s2+s3 < s1. It declares no limit in units of eps, since its error is
-          none of rounding; it is for matrices near a rotation, κ = ½.
-        - The step `cayley` where a start is more than 90° off, `quest` from 170° on; this is asked of the sample. Steps
-          declare no κ.
-
-        Where R* is not determined, κ ≥ 1/(8 eps), no error is defined. There R must be a rotation and lose no more
-        trace tr(RᵀA) than an error of tolerance / 2 could, rounding apart.
+        The fastest candidate whose error on the sample is at most tolerance / 2. Among those whose median time is
+        within its upper quartile, the most accurate one. If no candidate is accurate enough, `meets` is False, and the
+        most accurate candidate is returned.
 
     Raises:
-        ValueError: Wrong shape, no matrix, none that is finite, tolerance not positive, `previous` no rotations, dtype
-            neither float32 nor float64, or float64 where x64 is off.
-        TypeError: Complex, non-numeric or traced arrays, tolerance no number, dtype none at all.
+        ValueError: Wrong shape, no finite matrix, tolerance not positive, `previous` no rotations, unusable dtype.
+        TypeError: Complex, non-numeric or traced arrays; tolerance or dtype of the wrong type.
+
+    Accuracy:
+        A method is excluded if any finite input lies outside the domain it declares in `METHODS`. Where R* is not
+        determined, κ ≥ 1/(8 eps), the lost trace tr(RᵀA) is judged instead of the error.
+
+    Cost:
+        Some seconds to half a minute: up to twenty programs are compiled and run. Call it once, outside `jit`.
+
+    Example:
+        >>> import jax.numpy as jnp, jaxrot
+        >>> found = jaxrot.recommend(jnp.diag(jnp.array([1.0, 1e-3, -1e-4])), tolerance=1e-2)
+        >>> found.meets, found.error <= 0.005
+        (True, True)
     """
     return recommend_step_by_step(matrices, tolerance, previous, dtype, lambda step: None)
 
@@ -71,7 +63,7 @@ def recommend_step_by_step(
     dtype: DTypeLike | None,
     advance: Callable[[str], object],
 ) -> Recommendation:
-    """`recommend`; `advance` is called before each of at most `number_of_steps` steps, with what it is."""
+    """`recommend` with progress: calls `advance` with the name of each step before it starts, see `number_of_steps`."""
     tolerance = _check_tolerance(tolerance)
     advance("the reference")
     sample = take_sample(matrices, previous, dtype)
@@ -111,7 +103,7 @@ def recommend_step_by_step(
 
 
 def number_of_steps(*, has_previous: bool) -> int:
-    """How often `recommend_step_by_step` calls `advance` at most."""
+    """The largest number of times that `recommend_step_by_step` calls `advance`."""
     return 2 + len(METHODS) + has_previous * len(STEPS)
 
 
@@ -135,12 +127,15 @@ def _measure_all(
 
 
 def _step_name(step: str) -> str:
-    # `cayley` and `torque` are methods too.
+    # "steps" tells them from methods: `cayley` and `torque` are names of both.
     return f"{step} steps"
 
 
 def _cheapest(timed: list[Candidate]) -> Candidate:
-    """The most accurate of those whose median is within the spread of the fastest."""
+    """The most accurate candidate among those whose median is within the upper quartile of the fastest.
+
+    Medians closer than that change their order from run to run.
+    """
     _, slow_quartile = timed[0].time_quartiles_ns
     return min((each for each in timed if each.time_ns <= slow_quartile), key=lambda each: each.error)
 

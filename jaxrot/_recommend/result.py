@@ -1,4 +1,4 @@
-"""The result of `recommend`, and how it is put in words."""
+"""The result of `recommend`, and its summary in words."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -11,35 +11,35 @@ from jaxrot.solvers import DEFAULT_METHOD
 
 
 class Recommendation(NamedTuple):
-    """What to call, why, and what else there is.
+    """The recommended method or step, its measurements, and the alternatives.
 
-    Every method of `METHODS`, and with `previous` every step of `STEPS`, is in exactly one place: it is recommended, or
-    in `runners_up`, `too_inaccurate` or `excluded`.
+    Every method, and with `previous` every step, occurs once: it is recommended, or in `runners_up`, `too_inaccurate`
+    or `excluded`.
 
     Attributes:
-        name: The method's, or the step's and the number of iterations.
-        method: A name in `METHODS`, or None where a step is recommended.
-        step: A name in `STEPS`, or None where a method is.
-        iterations: How many steps, or None where a method is recommended.
-        apply: The function, for `jit`, `vmap` and `grad`: from matrices (..., 3, 3) to rotations, or, where `previous`
-            was given, from matrices and previous rotations. It computes in the dtype of its matrices.
+        name: The method, or the step and the number of iterations.
+        method: A name in `METHODS`, or None for a step.
+        step: A name in `STEPS`, or None for a method.
+        iterations: Number of steps, or None for a method.
+        apply: The function to call, from matrices (..., 3, 3) to rotations; with `previous` also from the previous
+            rotations. It computes in the dtype of its matrices.
         meets: The error is at most tolerance / margin.
-        error: The largest error ‖R − R*‖_F on the sample, R* the nearest rotation in wider arithmetic.
+        error: The largest error ‖R − R*‖_F on the sample; R* is computed in wider arithmetic.
         time_ns: Median time a matrix in ns, in batches of `batch`.
-        time_quartiles_ns: The quartiles beside the median.
+        time_quartiles_ns: The quartiles of that time.
         tolerance: As given.
-        margin: What the tolerance is divided by.
-        dtype: What was computed in, "float32" or "float64".
-        batch: Matrices in a call that was timed.
+        margin: Divides the tolerance.
+        dtype: Of the computation, "float32" or "float64".
+        batch: Matrices in a timed call.
         sample: Matrices whose error was measured.
         given: Matrices given.
-        not_finite: Of these, matrices left out because they, or their starts, hold a NaN or an infinity.
-        undetermined: Matrices of the sample with κ ≥ 1/(8 eps), or whose R hangs on subnormal entries: R* is not
-            determined there, and they are judged as `recommend` says.
-        runners_up: What else meets the tolerance, the fastest first.
-        too_inaccurate: What does not meet it, the smallest error first; not timed.
-        excluded: What is not for matrices like these, by name, with the reason in words. Steps have the word "steps"
-            behind their name.
+        not_finite: Matrices left out because they or their starts hold NaN or inf.
+        undetermined: Matrices of the sample whose R* is not determined: κ ≥ 1/(8 eps), or R depends on subnormal
+            entries. There R must be a rotation and lose no more trace tr(RᵀA) than an error of tolerance / margin
+            could, up to rounding.
+        runners_up: Other candidates that meet the tolerance, the fastest first.
+        too_inaccurate: Candidates that do not, the smallest error first; not timed.
+        excluded: Methods, and steps with "steps" after the name, that are not for these matrices, with the reason.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Recommendation(NamedTuple):
 
     @property
     def statement(self) -> str:
-        """All this in a few sentences."""
+        """The recommendation in a few sentences."""
         return " ".join([self._verdict(), *self._beside(), *self._left_out()])
 
     def _verdict(self) -> str:
@@ -92,7 +92,7 @@ class Recommendation(NamedTuple):
         sentences = []
         if faster := [each.name for each in self.runners_up if each.time_ns < self.time_ns]:
             sentences.append(
-                f"{listed(faster)} had a smaller median, but within the spread they are as fast, and"
+                f"{listed(faster)} had a smaller median time, but the difference is within the spread, and"
                 f" {self.name} has the smallest error."
             )
         for each in self.runners_up:
@@ -112,8 +112,8 @@ class Recommendation(NamedTuple):
             )
         if self.undetermined:
             sentences.append(
-                f"The nearest rotation of {_matrices(self.undetermined)} is not determined: there a rotation counts"
-                " as right that loses no trace tr(RᵀA)."
+                f"The nearest rotation of {_matrices(self.undetermined)} is not determined: there every rotation that"
+                " loses no trace tr(RᵀA) counts as right."
             )
         return sentences
 

@@ -1,4 +1,4 @@
-"""What a recommendation is measured on: a sample of the user's matrices, and what all of them are like.
+"""The sample of the user's matrices that `recommend` measures on, and a survey of all of them.
 
 notation: A a matrix; R* its nearest rotation; s1 ≥ s2 ≥ |s3| the signed singular values; κ = s1/(s2+s3).
 """
@@ -14,26 +14,26 @@ from jaxrot._inputs import check_matrix, check_start, computing
 from jaxrot.measuring import domain
 from jaxrot.measuring.judging import Judged, judge
 
-# More would not tell more, and the reference takes 20 µs a matrix.
+# A larger sample would not change the result, and the reference takes 20 µs a matrix.
 MOST_MATRICES = 10_000
-# Of each kind that a random sample of many could miss: the largest κ, and the smallest s3/s1, negative ones first.
+# The number of extreme matrices of each kind, which a random sample could miss: the largest κ and the smallest s3/s1.
 EXTREMES = 100
 
-# ‖RᵀR − 1‖_F beyond which a start is no rotation that drifted, but something else given by mistake.
+# A start with a larger ‖RᵀR − 1‖_F is not a rotation that has drifted, but a mistake of the caller.
 _FARTHEST_FROM_ROTATION = 0.1
 _CHUNK = 100_000
 
 
 class Sample(NamedTuple):
-    """The sample, and what was found out about all matrices.
+    """The sample, and a survey of all matrices.
 
     Attributes:
-        judged: The sample, in the dtype to compute in, with its reference.
+        judged: The sample in the computing dtype, with its reference.
         starts: The rotations to start from, one a matrix of the sample, or None.
-        given: Matrices given.
-        not_finite: Of these, matrices with a NaN or an infinity, or whose start has one: left out of everything.
-        not_upright: Of the finite ones, matrices with det A < 0, or 0 to rounding.
-        largest_condition: Largest κ of the finite ones; inf where R* is not unique to rounding.
+        given: Number of matrices given.
+        not_finite: Number of matrices left out because they or their starts hold NaN or inf.
+        not_upright: Number of finite matrices with det A < 0, or 0 up to rounding.
+        largest_condition: Largest κ of the finite matrices; inf if an R* is not unique up to rounding.
     """
 
     judged: Judged
@@ -45,20 +45,20 @@ class Sample(NamedTuple):
 
     @property
     def dtype(self) -> str:
-        """What is computed in: "float32" or "float64"."""
+        """The computing dtype: "float32" or "float64"."""
         return self.judged.matrices.dtype.name
 
     @property
     def finite(self) -> int:
-        """Matrices without a NaN or an infinity."""
+        """The number of matrices that are not left out."""
         return self.given - self.not_finite
 
 
 def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLike | None) -> Sample:
-    """Admits the arguments of `recommend`, looks at every matrix and draws the sample.
+    """Validates the arguments of `recommend`, surveys every matrix and draws the sample.
 
     Raises:
-        ValueError: A shape, a dtype or the contents are not what is expected.
+        ValueError: Wrong shape or dtype, no finite matrix, or `previous` does not hold rotations.
         TypeError: Arrays that are not real, or traced.
     """
     checked = computing(jnp.asarray(check_matrix(matrices, "matrices"))).value
@@ -95,7 +95,7 @@ def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLik
         starts=None if starts is None else starts[kept],
         given=given,
         not_finite=given - len(a),
-        # The sign of a determinant below that is rounding, and with it what a method for det A > 0 returns.
+        # Below this the sign of the determinant is rounding, and so is the result of a method for det A > 0.
         not_upright=int(np.sum(relative_s3 <= 8 * float(np.finfo(a.dtype).eps))),
         largest_condition=float(condition.max()),
     )
@@ -120,7 +120,7 @@ def _check_rotations(starts: np.ndarray) -> None:
     is_finite = np.asarray(np.isfinite(r).all(axis=(1, 2)))
     with np.errstate(all="ignore"):
         defect = np.linalg.norm(np.swapaxes(r, 1, 2) @ r - np.eye(3), axis=(1, 2))
-        # LAPACK gets no NaN: it promises nothing about one.
+        # Give LAPACK no NaN: it does not define the result.
         is_upright = np.linalg.det(np.where(is_finite[:, None, None], r, 0)) > 0
     wrong = int(np.sum(is_finite & ~((defect <= _FARTHEST_FROM_ROTATION) & is_upright)))
     if wrong:
@@ -131,14 +131,14 @@ def _check_rotations(starts: np.ndarray) -> None:
 
 
 def _survey(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """κ and s3/s1 of every matrix, in float64: to the rounding of that, not of the reference."""
+    """Returns κ and s3/s1 of every matrix, to float64 rounding, which is coarser than that of the reference."""
     parts = [_survey_chunk(matrices[begin : begin + _CHUNK]) for begin in range(0, len(matrices), _CHUNK)]
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
 def _survey_chunk(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     a = matrices.astype(np.float64)
-    # A power of two, which is exact: the determinant must neither overflow nor vanish.
+    # Scale by a power of two, which is exact. Unscaled, the determinant could overflow or underflow.
     _, exponent = np.frexp(np.abs(a).max(axis=(1, 2)))
     a = np.ldexp(a, -exponent[:, None, None])
     s = np.linalg.svd(a, compute_uv=False)
@@ -150,10 +150,10 @@ def _survey_chunk(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _draw(condition: np.ndarray, relative_s3: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Indices of the sample: the extremes and a random rest."""
+    """Returns the indices of the sample: the extremes and random others."""
     if len(condition) <= MOST_MATRICES:
         return np.arange(len(condition))
-    # Where R* is not determined no error is judged: the largest κ below that.
+    # Take the largest κ among the matrices whose R* is determined: the others have no error to measure.
     judged_condition = np.where(condition < domain.largest_condition(dtype.name), condition, 0)
     extremes = np.union1d(np.argsort(-judged_condition)[:EXTREMES], np.argsort(relative_s3)[:EXTREMES])
     others = np.setdiff1d(np.arange(len(condition)), extremes)

@@ -1,1 +1,1 @@
-"""Scenes in which rotations are extracted at every step: pure `step(state, parameters) -> state`."""
+"""Simulations that extract rotations in every step, each with a pure `step(state, parameters) -> state`."""

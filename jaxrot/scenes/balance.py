@@ -1,4 +1,4 @@
-"""Impulses inside a cluster that leave its momentum as it is."""
+"""Changes of velocity inside a cluster that conserve its linear and angular momentum."""
 
 import jax
 import jax.numpy as jnp
@@ -6,21 +6,21 @@ import jax.numpy as jnp
 from jaxrot._algebra import ldl, mat3
 from jaxrot._algebra.scaling import safe_divide
 
-# A cluster on a line has no inertia about it; the shift, relative to the trace, takes its place.
+# A cluster on a line has no inertia about that line, and its matrix is singular. This many eps of the trace are added.
 _SHIFT = 8
 
-# One pass leaves 4e-8 of the linear and 4e-7 of the angular momentum, the same in every step: 1e-4 in 1,000 steps. The
-# second removes what the first one left.
+# One pass leaves 4e-8 of the linear and 4e-7 of the angular momentum, the same in every step. In 1,000 steps that adds
+# up to 1e-4. The second pass removes the rest.
 _PASSES = 2
 
 
 def without_momentum(changes: jax.Array, arms: jax.Array, shares: jax.Array) -> jax.Array:
-    """The changes of velocity less their rigid part, so that they change neither momentum of their cluster.
+    """Returns the changes of velocity without their rigid part: they change no momentum of their cluster.
 
     Args:
-        changes: Wanted by every place of the cluster, shape (c, s, 3).
+        changes: Of the velocity in every place of the cluster, shape (c, s, 3).
         arms: Places from the centre of mass, shape (c, s, 3).
-        shares: Part of the cluster's mass in every place, shape (c, s, 1).
+        shares: The fraction of the cluster's mass in every place, shape (c, s, 1).
 
     Returns:
         u − ū − ω×r, ω = I⁻¹ Σ w r×u, shape (c, s, 3): Σ w u = 0 and Σ w r×u = 0, to rounding.
@@ -45,7 +45,7 @@ def _angular_velocity(second_moment: jax.Array, angular_momentum: jax.Array) -> 
     """I⁻¹ L with the inertia I = tr(M)·1 − M of the second moment M = Σ w r rᵀ; 0 for points that coincide."""
     m = mat3.components(second_moment)
     trace = mat3.trace(m)
-    # Over its trace the inertia has no unit, and vanishes with it where all points coincide.
+    # Divide the inertia by the trace: the result has no unit, and is 0 if all points coincide.
     inertia = jax.tree.map(lambda entry: safe_divide(entry, trace), mat3.gap_matrix(m))
     shift = jnp.full_like(trace, _SHIFT * float(jnp.finfo(trace.dtype).eps))
     x, y, z = (safe_divide(angular_momentum[..., i], trace) for i in range(3))

@@ -1,4 +1,4 @@
-"""A deformable body of overlapping clusters, as the arrays that a step of shape matching reads.
+"""A deformable body of overlapping clusters, for shape matching.
 
 Source: Müller et al. 2005, "Meshless deformations based on shape matching", sections 3.2 and 4.4.
 """
@@ -21,17 +21,18 @@ from jaxrot.scenes.scene import LARGEST_COORDINATE
 class Body(NamedTuple):
     """A body of n vertices in c clusters of at most s vertices, each vertex in at most k clusters.
 
-    A vertex gives each of its clusters an equal part of its mass. What the clusters want of it then averages without a
-    change of momentum.
+    The mass of a vertex is divided equally between its clusters. So the mean of the clusters' changes conserves
+    momentum.
 
     Attributes:
         rest_positions: Of the vertices, m, shape (n, 3).
         masses: Of the vertices, kg, shape (n,).
-        members: Vertex of every place in a cluster, int32, shape (c, s); empty places name vertex 0.
-        shares: Part of the cluster's mass in every place, shape (c, s); they sum to 1, and are 0 in empty places.
+        members: The vertex in every place of a cluster, int32, shape (c, s); 0 in empty places.
+        shares: The fraction of the cluster's mass in every place, shape (c, s). They sum to 1, and are 0 in empty
+            places.
         offsets: Places at rest from the cluster's centre of mass, m, shape (c, s, 3).
-        places: Where a vertex stands in the clusters, int32 into c·s places, shape (n, k); c·s where there is none.
-        cluster_counts: How many clusters a vertex is in, shape (n,), as a floating-point number.
+        places: The places of a vertex, int32 indices into the c·s places, shape (n, k), filled up with c·s.
+        cluster_counts: The number of clusters of a vertex, shape (n,), as a floating-point number.
     """
 
     rest_positions: jax.Array
@@ -50,11 +51,11 @@ def build_body(
     *,
     dtype: type = np.float32,
 ) -> Body:
-    """The body with this shape at rest.
+    """Returns the body with this shape at rest.
 
     Args:
         rest_vertices: Shape (n, 3), m.
-        clusters: Vertex indices of every cluster; lengths may differ, every vertex must be in one.
+        clusters: Vertex indices of every cluster. Lengths may differ; every vertex must be in a cluster.
         masses: Of the vertices, kg, shape (n,); 1/n each if not given.
         dtype: Of the floating-point arrays.
 
@@ -88,7 +89,7 @@ def build_body(
 def build_two_scale_body(
     rest_vertices: ArrayLike, masses: ArrayLike | None = None, *, cluster_size: int = 32, dtype: type = np.float32
 ) -> Body:
-    """The body in clusters of neighbours, two for every vertex on average, and of vertices from all over it.
+    """Returns a body with clusters of neighbours, two for every vertex on average, and clusters across the whole body.
 
     Args:
         rest_vertices: Shape (n, 3), m.
@@ -99,7 +100,8 @@ def build_two_scale_body(
     Raises:
         ValueError: As `build_body`; a size that is not positive.
 
-    Building takes time like n², a second for 23,000 vertices; a step takes time like n.
+    Cost:
+        Building takes time in proportion to n², a second for 23,000 vertices. A step takes time in proportion to n.
     """
     if cluster_size < 1:
         raise ValueError(f"cluster_size must be positive; got {cluster_size}")
@@ -108,7 +110,7 @@ def build_two_scale_body(
 
 
 def checked_vertices(vertices: ArrayLike, name: str = "vertices") -> np.ndarray:
-    """The vertices as float64 of shape (n, 3), or a ValueError."""
+    """Returns the vertices as float64 of shape (n, 3), or raises a ValueError."""
     checked = np.asarray(vertices, dtype=np.float64)
     if checked.ndim != 2 or checked.shape[1] != 3 or not len(checked):
         raise ValueError(f"{name} must have shape (n, 3), n > 0; got shape {checked.shape}")

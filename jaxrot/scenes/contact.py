@@ -1,4 +1,4 @@
-"""Contact of points with a ground plane and axis-aligned boxes: positions are moved out, velocities answer."""
+"""Contact of points with a ground plane and axis-aligned boxes, by corrections of positions and velocities."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -16,13 +16,13 @@ Corners = Sequence[Sequence[float]] | np.ndarray
 
 @exportable
 class Contact(NamedTuple):
-    """What the points may touch, and how they answer.
+    """The obstacles, and how points respond to them.
 
     Attributes:
         ground_height: Of the ground, whose normal is the third axis, m, shape ().
-        box: Lower and upper corner of a box that the points stay in, m, shape (2, 3).
-        obstacle: Lower and upper corner of a box that they stay out of, m, shape (2, 3).
-        restitution: Part of the normal velocity that comes back, 0 to 1, shape ().
+        box: Lower and upper corner of a box around the points, m, shape (2, 3).
+        obstacle: Lower and upper corner of a box that the points must not enter, m, shape (2, 3).
+        restitution: The fraction of the normal velocity after an impact, 0 to 1, shape ().
         friction: Coulomb's coefficient, ≥ 0, shape ().
     """
 
@@ -35,7 +35,7 @@ class Contact(NamedTuple):
 
 @exportable
 class Motion(NamedTuple):
-    """Points on the move: positions, m, and velocities, m/s, each of shape (n, 3)."""
+    """The positions, m, and velocities, m/s, of points, each of shape (n, 3)."""
 
     positions: jax.Array
     velocities: jax.Array
@@ -50,10 +50,10 @@ def build_contact(
     friction: float = 0.5,
     dtype: type = np.float32,
 ) -> Contact:
-    """What the points may touch; what is not given is nowhere.
+    """Returns the obstacles. Those not given are infinitely far away.
 
     Raises:
-        ValueError: A box without room, restitution outside 0 to 1, negative friction, or a NaN.
+        ValueError: An empty box, restitution outside 0 to 1, negative friction, or a NaN.
     """
     corners = np.asarray(box, dtype=np.float64)
     if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
@@ -71,20 +71,20 @@ def build_contact(
 
 
 def stand_on_ground(motion: Motion, contact: Contact) -> Motion:
-    """Points under the ground are put onto it."""
+    """Moves points under the ground onto it."""
     depth = jnp.maximum(contact.ground_height - motion.positions[:, 2], 0)
     zero = jnp.zeros_like(depth)
     return pushed_out(motion, jnp.stack([zero, zero, depth], axis=-1), contact)
 
 
 def stay_in_box(motion: Motion, contact: Contact) -> Motion:
-    """Points outside the box are put onto its nearest point."""
+    """Moves points outside the box to its nearest point."""
     inside = jnp.clip(motion.positions, contact.box[:1], contact.box[1:])
     return pushed_out(motion, inside - motion.positions, contact)
 
 
 def stay_out_of_obstacle(motion: Motion, contact: Contact) -> Motion:
-    """Points inside the obstacle leave it through its nearest face."""
+    """Moves points inside the obstacle to its nearest face."""
     to_lower, to_upper = motion.positions - contact.obstacle[:1], contact.obstacle[1:] - motion.positions
     depth = jnp.minimum(to_lower, to_upper)
     inside = (depth > 0).all(axis=-1, keepdims=True)
@@ -94,16 +94,16 @@ def stay_out_of_obstacle(motion: Motion, contact: Contact) -> Motion:
 
 
 def pushed_out(motion: Motion, displacements: jax.Array, contact: Contact) -> Motion:
-    """Points put onto the surface of what they went into; they go no further into it.
+    """Moves points to the surface of an obstacle, and applies restitution and friction to their velocities.
 
     Args:
         motion: The points.
-        displacements: The shortest way out, m, shape (n, 3); 0 for points that do not touch.
-        contact: How they answer.
+        displacements: The shortest way out, m, shape (n, 3); 0 for points without contact.
+        contact: Restitution and friction.
 
     Returns:
-        The points on the surface. A normal velocity inwards is reversed, times the restitution; the tangential one
-        loses the friction coefficient times the change of the normal one, and at most all of itself.
+        The points on the surface. An inward normal velocity is reversed and multiplied by the restitution. The
+        tangential velocity decreases by the friction coefficient times the change of the normal one, at most to 0.
     """
     normals = safe_divide(displacements, jnp.broadcast_to(_lengths(displacements), displacements.shape))
     normal_speeds = jnp.sum(motion.velocities * normals, axis=-1, keepdims=True)

@@ -26,7 +26,7 @@ TANGENTS = ("exact", "held", "projected")
 
 @exportable
 class State(NamedTuple):
-    """What moves.
+    """The state of the body.
 
     Attributes:
         positions: Shape (n, 3), m.
@@ -41,7 +41,7 @@ class State(NamedTuple):
 
 @exportable
 class Parameters(NamedTuple):
-    """What does not move.
+    """The parameters, which a step does not change.
 
     Attributes:
         elements: The elements and their stiffness.
@@ -73,7 +73,7 @@ def build(
     fixed: np.ndarray | None = None,
     dtype: str = "float32",
 ) -> tuple[State, Parameters]:
-    """The state at rest, and the parameters.
+    """Returns the state at rest, and the parameters.
 
     Args:
         vertices: At rest, shape (n, 3), m.
@@ -145,31 +145,42 @@ def step(
     tolerance: float = 1e-5,
     gravity: bool = True,
 ) -> State:
-    """One time step.
+    """Returns the state one time step later, by co-rotational finite elements.
 
-    All choices are static; what they switch off is not in the compiled program.
+    All options are static. The compiled program leaves out what they turn off.
 
     Args:
         state: The state.
-        parameters: The parameters; differentiable, as the state is, in both modes.
-        integrator: "euler" loses energy the faster the larger the time step; "midpoint" does not.
+        parameters: The parameters.
+        integrator: "euler" loses energy, more with a larger time step; "midpoint" does not.
         rotation: A name in `jaxrot.STEPS`, or, if `iterations` is None, in `jaxrot.METHODS`.
         iterations: Steps of `rotation` from the rotation in the state, at every evaluation of the force. 0 keeps the
-            state's rotations, linear elasticity from the identity. None: a cold start.
-        tangent: "held" takes the rotations for constant. "exact" has their derivative: Newton's method is quadratic
-            near a stable equilibrium. "projected" is the same made positive semidefinite, for large deformations.
+            state's rotations, which from the identity is linear elasticity. None: a cold start.
+        tangent: "held" treats the rotations as constant. "exact" includes their derivative: Newton's method converges
+            quadratically near a stable equilibrium. "projected" is "exact" made positive semidefinite, for large
+            deformations.
         newton_iterations: At least 1.
         line_search: How many times the Newton step may be halved until the potential does not increase.
-        conjugate_gradients: The most iterations of a linear solve.
+        conjugate_gradients: The largest number of iterations of a linear solve.
         tolerance: Of a linear solve, relative to the right-hand side.
         gravity: Whether there is gravity.
 
     Raises:
-        ValueError: An unknown choice.
+        ValueError: An unknown option.
+
+    Derivative:
+        Forward and reverse, with respect to the state and the parameters.
+
+    Example:
+        >>> from jaxrot.scenes import corotational, tetrahedra
+        >>> cube = tetrahedra.box((1, 1, 1), (1.0, 1.0, 1.0))
+        >>> state, parameters = corotational.build(*cube, young=1e5, time_step=0.1)
+        >>> round(corotational.step(state, parameters).velocities[:, 2].mean().item(), 2)
+        -0.98
     """
     choices = Choices(rotation, iterations, tangent, newton_iterations, line_search, conjugate_gradients, tolerance)
     _check_choices(integrator, choices)
-    # The midpoint of the step is a step of implicit Euler half as long, from where the second half mirrors the first.
+    # The midpoint rule is a step of implicit Euler to the middle of the time step; the second half mirrors the first.
     midpoint = integrator == "midpoint"
     seconds = 0.5 * parameters.time_step if midpoint else parameters.time_step
     problem = euler_problem(state, parameters, seconds, gravity=gravity)
@@ -181,7 +192,7 @@ def step(
 
 
 def euler_problem(state: State, parameters: Parameters, seconds: jax.Array, *, gravity: bool = True) -> Problem:
-    """The potential whose minimum is a step of implicit Euler; for `newton.minimise` and `newton.residuals`.
+    """Returns the potential whose minimum is a step of implicit Euler, for `newton.minimise` and `newton.residuals`.
 
     Source: Gast et al. 2015.
     """

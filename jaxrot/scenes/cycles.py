@@ -1,8 +1,8 @@
 """Powers of a cycle of rotations, exact after any number of steps.
 
-After q whole cycles and r steps more the product is C^q P_r: C that of one cycle, P_r of its first r rotations. C^q
-turns about the axis of C by q times its angle; counted in turns, as a fixed-point number, that product loses nothing
-but whole turns. So the reference needs neither float64 in the program nor a sum over a million steps.
+After q whole cycles and r further steps the product is C^q P_r. C is the product of one cycle, P_r that of its first r
+rotations. C^q is a rotation about the axis of C by q times its angle. Counted in turns as a fixed-point number, q times
+the angle loses only whole turns. So the reference needs no float64 in the program, and no sum over a million steps.
 """
 
 from typing import NamedTuple
@@ -11,13 +11,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-# The angle of a cycle is three digits of 16 bits, the highest first, in units of 2⁻¹⁶, 2⁻³² and 2⁻⁴⁸ turns: products of
-# two digits fit in 32 bits, and after 1e6 cycles the angle is good to 1e-8 rad.
+# The angle of a cycle is three digits of 16 bits, the highest first, in units of 2⁻¹⁶, 2⁻³² and 2⁻⁴⁸ turns. Products of
+# two digits fit in 32 bits. After 1e6 cycles the error of the angle is below 1e-8 rad.
 _DIGIT = 1 << 16
 
 
 class Cycle(NamedTuple):
-    """The product of a cycle, and those of its beginnings.
+    """The product of a cycle of rotations, and the products of its first rotations.
 
     Attributes:
         beginnings: P_r, the products of the first r rotations, r = 0 ... period − 1, shape (period, ..., 3, 3).
@@ -37,7 +37,7 @@ def rotations(vectors: np.ndarray) -> np.ndarray:
 
 
 def of(increments: np.ndarray) -> Cycle:
-    """The cycle of the rotations nearest to the increments; computed in float64, returned in their dtype.
+    """Returns the cycle of the rotations nearest to the increments, computed in float64, in their dtype.
 
     Args:
         increments: Rotations up to rounding, each by less than half a turn, shape (period, ..., 3, 3).
@@ -55,7 +55,7 @@ def of(increments: np.ndarray) -> Cycle:
         beginnings.append(product / np.linalg.norm(product, axis=-1, keepdims=True))
     last = beginnings.pop()
     sine = np.linalg.norm(last[..., 1:], axis=-1, keepdims=True)
-    # A cycle that turns by nothing has no axis, and needs none.
+    # A cycle with the angle 0 has no axis. Divide by 1 instead of 0; the axis is not used.
     axis = last[..., 1:] / np.where(sine == 0, 1, sine)
     turns = np.arctan2(sine, last[..., :1]) / np.pi
     count = np.round(turns * float(_DIGIT) ** 3).astype(np.int64)
@@ -66,7 +66,7 @@ def of(increments: np.ndarray) -> Cycle:
 
 
 def power(cycle: Cycle, count: jax.Array) -> jax.Array:
-    """The product of `count` rotations of the cycle, over and over; shape (..., 3, 3), the dtype of the cycle.
+    """Returns the product of the first `count` rotations of the repeated cycle, shape (..., 3, 3), dtype of the cycle.
 
     Args:
         cycle: See `Cycle`.
@@ -78,22 +78,22 @@ def power(cycle: Cycle, count: jax.Array) -> jax.Array:
     # Rodrigues' formula, column by column.
     along = jnp.sum(cycle.axis[..., None] * beginning, axis=-2, keepdims=True) * cycle.axis[..., None]
     across = jnp.cross(jnp.broadcast_to(cycle.axis[..., None], beginning.shape), beginning, axis=-2)
-    # 2 sin² keeps the digits of a small angle, which 1 − cos loses.
+    # 2 sin² is accurate for a small angle; 1 − cos would cancel.
     versine = (2 * jnp.sin(angle / 2) ** 2)[..., None]
     return beginning + jnp.sin(angle)[..., None] * across + versine * (along - beginning)
 
 
 def _angle(turns: jax.Array, factor: jax.Array, dtype: np.dtype) -> jax.Array:
-    """2π times the product's fraction of a turn, in (−π, π]: good to rounding, whatever the factor."""
+    """The angle turns·factor in radians, in (−π, π], without whole turns: accurate to rounding for every factor."""
     high, middle, low = (turns[..., i] for i in range(3))
     factor_high, factor_low = factor // _DIGIT, factor % _DIGIT
-    # Long multiplication from the lowest digit; what exceeds the highest is whole turns and drops out.
+    # Long multiplication from the lowest digit. Carries out of the highest digit are whole turns, and are dropped.
     lowest = factor_low * low
     second, third = factor_low * middle, factor_high * low
     carried = lowest // _DIGIT + second % _DIGIT + third % _DIGIT
     highest = carried // _DIGIT + second // _DIGIT + third // _DIGIT + factor_low * high + factor_high * middle
     digits = [(x % _DIGIT).astype(dtype) for x in (highest, carried, lowest)]
-    # The nearest of the turns, so that a small negative angle keeps its digits too.
+    # Use the signed remainder, so that a small negative angle keeps its digits too.
     signed = jnp.where(digits[0] >= _DIGIT // 2, digits[0] - _DIGIT, digits[0])
     return 2 * np.pi / _DIGIT * (signed + (digits[1] + digits[2] / _DIGIT) / _DIGIT)
 

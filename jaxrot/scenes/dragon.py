@@ -1,4 +1,4 @@
-"""The Stanford dragon, and how it finds its shape again: Müller et al. 2016, Fig. 7; see `dragon.txt`."""
+"""The Stanford dragon, which recovers its shape: Müller et al. 2016, Fig. 7; see `dragon.txt`."""
 
 from importlib import resources
 
@@ -37,28 +37,28 @@ def standing_vertices(*, fine: bool = False) -> np.ndarray:
 
 
 def dragon(mesh_vertices: ArrayLike | None = None) -> Scene:
-    """The dragon, or a body of the caller's, from anywhere in its bounding box back to its shape.
+    """Returns the scene of the dragon, or another body, that recovers its shape from random vertices.
 
     Args:
-        mesh_vertices: Of another body at rest, shape (n, 3), any unit, the third axis up.
+        mesh_vertices: The other body at rest, shape (n, 3), any unit, the third axis up.
 
     Raises:
         ValueError: Vertices of another shape, or not finite.
     """
     if mesh_vertices is not None:
         return _recovery("Body", checked_vertices(mesh_vertices), seed=0)
-    # Scrambled, the body has no orientation left but by chance. This dragon ends on its feet, 20° off.
+    # Scrambled vertices leave the final orientation to chance. With this seed the dragon ends on its feet, 20° off.
     return _recovery("Stanford dragon", standing_vertices(), seed=23)
 
 
 def dragon_fine() -> Scene:
-    """The dragon with 22,998 vertices."""
+    """Returns the scene of the dragon with 22,998 vertices."""
     return _recovery("Stanford dragon", standing_vertices(fine=True), seed=34)
 
 
 def _recovery(name: str, vertices: np.ndarray, seed: int) -> Scene:
     body = build_two_scale_body(vertices)
-    # Slow enough to be watched: at stiffness 1 the dragon has its shape after 50 steps.
+    # A low stiffness, so that the recovery is visible: at stiffness 1 it takes only 50 steps.
     parameters = build_parameters(body, time_step=STEP_SECONDS, stiffness=0.05, damping=0.2)
     scrambled = np.random.default_rng(seed).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
     return Scene(

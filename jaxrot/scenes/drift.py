@@ -1,7 +1,7 @@
-"""Drift: a rotation matrix turned by a million small rotations, and repaired or not.
+"""Drift: the product of a million small rotations, with and without repair.
 
-Rounding takes the product off the rotations and away from the exact one. Which repair holds it, and how often it is
-needed, is what this scene measures; its reference has no error that grows.
+Rounding makes the product deviate from a rotation, and from the exact product. This scene measures which repair
+prevents that, and how often it is needed. The error of its reference does not grow.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from jaxrot.scenes.cycles import Cycle
 from jaxrot.scenes.free_top import tumbling_rates
 from jaxrot.scenes.scene import Scene
 
-# What `drift` shows side by side: a name, the repair, and after how many products.
+# The columns of `drift`: a name, the repair, and the number of products between repairs.
 _SHOWN = (
     ("no repair", None, 1),
     ("gram_schmidt", "gram_schmidt", 1),
@@ -33,11 +33,11 @@ _MAGNIFIED = 50  # the deviation in its pictures: without repair it is a twentie
 
 @exportable
 class State(NamedTuple):
-    """What turns: any number of bodies.
+    """The orientations of any number of bodies.
 
     Attributes:
         rotation: From the body's axes to space, shape (..., 3, 3).
-        step_count: The steps made, int32, shape (): one for all bodies.
+        step_count: The number of steps so far, int32, shape (): one for all bodies.
     """
 
     rotation: jax.Array
@@ -46,11 +46,11 @@ class State(NamedTuple):
 
 @exportable
 class Parameters(NamedTuple):
-    """How it turns: by a cycle of increments, over and over.
+    """The increments of the rotation, a cycle that repeats.
 
     Attributes:
-        increments: The rotations in the body's axes by which the steps turn, shape (period, ..., 3, 3).
-        cycle: What the reference needs.
+        increments: The rotations of the steps, in the body's axes, shape (period, ..., 3, 3).
+        cycle: The same cycle in the form that the reference needs.
     """
 
     increments: jax.Array
@@ -58,10 +58,10 @@ class Parameters(NamedTuple):
 
 
 def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -> tuple[State, Parameters]:
-    """Bodies that turn at these rates, from the identity.
+    """Returns the state and the parameters of bodies that turn at these rates, from the identity.
 
-    The increments are exp([ω]× Δt), rounded to the dtype. The reference turns by the rotations nearest to the rounded
-    ones: what a body then is away from it, repair and rounding of the products have done, and nothing else.
+    The increments are exp([ω]× Δt), rounded to the dtype. The reference uses the rotations nearest to the rounded ones.
+    So the deviation from it is caused only by the repair and by the rounding of the products.
 
     Args:
         rates: Body rates ω of every step of a cycle, rad/s, shape (period, ..., 3); a constant rate has the period 1.
@@ -91,17 +91,23 @@ def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -
 
 
 def step(state: State, parameters: Parameters, *, repair: str | None = DEFAULT_METHOD, every: int = 1) -> State:
-    """One product, R ← R exp([ω]× Δt), and its repair.
+    """Returns the state after one product R ← R exp([ω]× Δt), and its repair.
 
     Args:
         state: See `State`.
         parameters: See `Parameters`.
-        repair: A name in `METHODS`, or None for no repair, which then costs nothing. Static.
-        every: Repair after every so many products. Static; 1 leaves the question whether out of the program. A `vmap`
-            over `step_count` would repair in every step and choose afterwards: let the arrays hold the bodies instead.
+        repair: A name in `METHODS`, or None for no repair at no cost. Static.
+        every: Repair after this many products. Static. With 1 the program has no condition. A `vmap` over `step_count`
+            would repair in every step and select afterwards: put the bodies on a batch axis of the arrays instead.
 
     Raises:
         ValueError: Unknown repair, or `every` below 1.
+
+    Example:
+        >>> from jaxrot.scenes import drift
+        >>> state, parameters = drift.build([[0.0, 0.0, 1.0]], 0.5)
+        >>> round(drift.step(state, parameters).rotation[1, 0].item(), 3)
+        0.479
     """
     if repair is not None and repair not in METHODS:
         raise ValueError(f"repair must be None or one of {', '.join(sorted(METHODS))}; got {repair!r}")
@@ -119,19 +125,19 @@ def step(state: State, parameters: Parameters, *, repair: str | None = DEFAULT_M
 def advance(
     state: State, parameters: Parameters, steps: ArrayLike, *, repair: str | None = DEFAULT_METHOD, every: int = 1
 ) -> State:
-    """Many steps; their number may be traced, so that one program makes any number of them."""
+    """Returns the state after many steps. Their number may be traced, so one program serves every number of steps."""
     return lax.fori_loop(0, steps, lambda _, s: step(s, parameters, repair=repair, every=every), state)
 
 
 def reference(state: State, parameters: Parameters) -> jax.Array:
-    """The exact rotation after `state.step_count` steps, in closed form, to a few eps at any count; (..., 3, 3)."""
+    """The exact rotation after `state.step_count` steps, shape (..., 3, 3), by a closed form, always to a few eps."""
     return cycles.power(parameters.cycle, state.step_count)
 
 
 def orientation_error(state: State, parameters: Parameters) -> jax.Array:
     """The angle between the reference and the rotation nearest to the state's matrix, rad, shape (...)."""
     exact = jnp.broadcast_to(reference(state, parameters), state.rotation.shape)
-    # Three steps from the reference: cubic convergence, from any start.
+    # Three steps from the reference are enough: `newton` converges cubically from any start.
     nearest = refine_rotation(state.rotation, exact, step="newton", iterations=3)
     return 2 * jnp.arcsin(jnp.minimum(jnp.sqrt(_sum_of_squares(nearest - exact) / 8), 1))
 
@@ -143,9 +149,9 @@ def orthonormality_error(state: State) -> jax.Array:
 
 
 def drift() -> Scene:
-    """A tumbling top, five times beside the exact one: without repair, and with four. A step is 1,000 products.
+    """A tumbling top without repair, with four repairs, and exact. A step is 1,000 products.
 
-    The picture shows the axes of each, their deviation from the exact axes (drawn above) magnified 50 times.
+    The picture shows the axes of each. Their deviation from the exact axes, drawn above, is magnified 50 times.
     """
     rates, time_step = tumbling_rates((1.0, 2.0, 3.0), (0.05, 1.0, 0.05), 500)
     start, parameters = build(rates, time_step)
@@ -178,7 +184,7 @@ def drift() -> Scene:
 
 
 def _product(a: jax.Array, b: jax.Array) -> jax.Array:
-    """The matrix product, elementwise: an accelerator would round the factors of `@` to TF32, 1e-3."""
+    """The matrix product by elementwise products: an accelerator would round the factors of `@` to TF32, 1e-3."""
     x, y, z = (a[..., :, i, None] * b[..., i, None, :] for i in range(3))
     return x + y + z
 

@@ -13,16 +13,16 @@ from jaxrot.scenes.shape_matching import build_parameters, build_state, step
 
 STEP_SECONDS = 1 / 120
 GRAVITY = 9.81
-# Of a body with a diagonal of one metre.
+# In metres, for a body with a diagonal of one metre.
 ROOM = ((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
 BLOCK = ((-0.8, -0.4, -0.1), (-0.1, 0.4, 0.25))
 
 
 def drop(mesh_vertices: ArrayLike | None = None) -> Scene:
-    """The dragon, or a body of the caller's, dropped onto a block on the ground, in a room.
+    """Returns the scene of the dragon, or another body, dropped onto a block on the ground in a room.
 
     Args:
-        mesh_vertices: Of another body at rest, shape (n, 3), the third axis up; scaled to a diagonal of 1 m.
+        mesh_vertices: The other body at rest, shape (n, 3), the third axis up; scaled to a diagonal of 1 m.
 
     Raises:
         ValueError: Vertices of another shape, not finite, or all in one place.

@@ -1,8 +1,9 @@
 """Co-rotational linear elasticity on tetrahedra: energy, force, and two tangents as matrix-free products.
 
-Ψ(F) = μ ‖F − R‖² + λ/2 (tr(RᵀF) − 3)² a volume, R the rotation nearest to F, det R = +1 for inverted elements too.
-Written with the strain ε = sym(RᵀF) − 1, which at the nearest rotation is S − 1, Ψ = μ ‖ε‖² + λ/2 tr(ε)²: so its
-derivative with R held has no stiffness against rotations, and with R = 1 is that of linear elasticity.
+The energy per volume is Ψ(F) = μ ‖F − R‖² + λ/2 (tr(RᵀF) − 3)². R is the rotation nearest to F, with det R = +1 for
+inverted elements too. In terms of the strain ε = sym(RᵀF) − 1, which is S − 1 at the nearest rotation,
+Ψ = μ ‖ε‖² + λ/2 tr(ε)². In this form the derivative with R held constant has no stiffness against rotations. With R = 1
+it is linear elasticity.
 
 Sources: Etzmuß et al. 2003; Müller and Gross 2004; Chao et al. 2010; McAdams et al. 2011 (the energy); Smith, de Goes
 and Kim 2019 (the eigenvalues of its Hessian).
@@ -24,8 +25,8 @@ class Elements(NamedTuple):
 
     Attributes:
         corners: Vertex indices, shape (m, 4).
-        incidence: Where each vertex occurs in `corners.ravel()`, filled up with 4 m, shape (n, largest valence).
-        rest_inverses: Inverses of the edge matrices at rest, shape (m, 3, 3), 1/m; their rows are the gradients of the
+        incidence: The positions of each vertex in `corners.ravel()`, filled up with 4 m, shape (n, largest valence).
+        rest_inverses: Inverses of the edge matrices at rest, shape (m, 3, 3), 1/m. Their rows are the gradients of the
             linear functions that are 1 at corners 1, 2 and 3.
         volumes: At rest, shape (m,), m³.
         shear_modulus: μ, Lamé's second parameter, shape (m,), Pa.
@@ -41,27 +42,27 @@ class Elements(NamedTuple):
 
 
 def lame_parameters(young: Any, poisson: Any) -> tuple[Any, Any]:
-    """(μ, λ) from Young's modulus, Pa, and Poisson's ratio: numbers, or arrays of NumPy or JAX."""
+    """Returns Lamé's parameters (μ, λ) from Young's modulus, Pa, and Poisson's ratio: numbers or arrays."""
     return young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
 
 
 def deformation_gradients(positions: jax.Array, elements: Elements) -> jax.Array:
-    """F of each element, shape (m, 3, 3); linear: that of a displacement is the change of F."""
+    """Returns F of each element, shape (m, 3, 3). It is linear: of a displacement it is the change of F."""
     corners = positions.at[elements.corners].get(mode="promise_in_bounds")
-    # The differences first: far from the origin a sum over the four corners would cancel digits.
+    # Take the differences first: far from the origin a sum over the four corners would cancel.
     edges = corners[:, 1:] - corners[:, :1]
     return _product(jnp.swapaxes(edges, -1, -2), elements.rest_inverses)
 
 
 def nodal_gradient(stress: jax.Array, elements: Elements) -> jax.Array:
-    """Σ V P b over the elements around each vertex: the transpose of `deformation_gradients`, shape (n, 3).
+    """Returns Σ V P b over the elements around each vertex, shape (n, 3): the transpose of `deformation_gradients`.
 
     Args:
-        stress: ∂Ψ/∂F, shape (m, 3, 3), Pa; then the result is ∂E/∂x, minus the force, N.
+        stress: ∂Ψ/∂F, shape (m, 3, 3), Pa. The result is then ∂E/∂x, the negative force, N.
         elements: The elements.
     """
     scaled = stress * elements.volumes[:, None, None]
-    # Row a is the product of the stress with the gradient of corner a's function.
+    # Row a is the product of the stress and the gradient of the linear function of corner a.
     others = jnp.sum(elements.rest_inverses[:, :, None, :] * scaled[:, None, :, :], axis=-1)
     corners = jnp.concatenate([-jnp.sum(others, axis=1, keepdims=True), others], axis=1).reshape(-1, 3)
     return jnp.sum(corners.at[elements.incidence].get(mode="fill", fill_value=0), axis=1)
@@ -70,13 +71,13 @@ def nodal_gradient(stress: jax.Array, elements: Elements) -> jax.Array:
 def element_rotations(
     gradients: jax.Array, rotations: jax.Array, *, rotation: str, iterations: int | None
 ) -> jax.Array:
-    """The rotation of each element.
+    """Returns the rotation of each element.
 
     Args:
         gradients: F, shape (m, 3, 3).
         rotations: The warm start, shape (m, 3, 3).
         rotation: A name in `jaxrot.STEPS`, or, if `iterations` is None, in `jaxrot.METHODS`.
-        iterations: Steps from the warm start. 0 keeps it: from the identity that is linear elasticity. None: a cold
+        iterations: Steps from the warm start. 0 keeps it, which from the identity is linear elasticity. None: a cold
             start.
     """
     if iterations is None:
@@ -85,7 +86,7 @@ def element_rotations(
 
 
 def energy(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> jax.Array:
-    """The elastic energy Σ V (μ ‖ε‖² + λ/2 tr(ε)²), a scalar, J; at the nearest rotation that is Ψ."""
+    """Returns the elastic energy Σ V (μ ‖ε‖² + λ/2 tr(ε)²), a scalar, J. At the nearest rotation it is Σ V Ψ."""
     strain = _strain(gradients, rotations)
     shear = elements.shear_modulus * jnp.sum(strain**2, axis=(-2, -1))
     return jnp.sum(elements.volumes * (shear + 0.5 * elements.lame_first * _trace(strain) ** 2))
@@ -94,14 +95,15 @@ def energy(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> ja
 def stress(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> jax.Array:
     """∂Ψ/∂F = R (2 μ ε + λ tr(ε) 1), shape (m, 3, 3), Pa.
 
-    R is held, and the derivative is exact: what ∂R/∂F adds is a product of a symmetric matrix, that in brackets times
-    S = RᵀF, with a skew one. At the nearest rotation it is 2 μ (F − R) + λ (tr S − 3) R.
+    R is held constant, and the derivative is still exact. The term with ∂R/∂F vanishes: it is the inner product of a
+    symmetric matrix, the bracket times S = RᵀF, and a skew one. At the nearest rotation the stress is
+    2 μ (F − R) + λ (tr S − 3) R.
     """
     return _rotated(_strain(gradients, rotations), rotations, elements)
 
 
 def held_tangent(rotations: jax.Array, elements: Elements) -> Callable[[jax.Array], jax.Array]:
-    """Ḟ to Ṗ with R held: "stiffness warping", positive semidefinite.
+    """Returns the map from Ḟ to Ṗ with R held constant, "stiffness warping". It is positive semidefinite.
 
     Source: Müller and Gross 2004.
     """
@@ -113,9 +115,10 @@ def held_tangent(rotations: jax.Array, elements: Elements) -> Callable[[jax.Arra
 
 
 def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> Callable[[jax.Array], jax.Array]:
-    """Ḟ to Ṗ with R's derivative: 2 μ (Ḟ − Ṙ) + λ ((R:Ḟ) R + (tr S − 3) Ṙ).
+    """Returns the map from Ḟ to Ṗ with R's derivative: 2 μ (Ḟ − Ṙ) + λ ((R:Ḟ) R + (tr S − 3) Ṙ).
 
-    Newton's method is quadratic with it near a stable equilibrium. In compression it has negative eigenvalues.
+    With it Newton's method converges quadratically near a stable equilibrium. In compression it has negative
+    eigenvalues.
 
     Args:
         gradients: F, shape (m, 3, 3).
@@ -123,7 +126,8 @@ def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements
         elements: The elements.
     """
     shear = 2 * elements.shear_modulus[:, None, None]
-    # Without iterations what is left is the rule of the derivative at R; linearised, its inverses are formed once.
+    # With 0 iterations `refine_rotation` only applies the derivative rule at R. `jax.linearize` computes its inverses
+    # once for all products.
     _, turned = jax.linearize(lambda f: refine_rotation(f, rotations, iterations=0), gradients)
     pressure = (elements.lame_first * _trace(_strain(gradients, rotations)))[:, None, None]
 
@@ -138,10 +142,10 @@ def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements
 def projected_tangent(
     gradients: jax.Array, rotations: jax.Array, elements: Elements
 ) -> Callable[[jax.Array], jax.Array]:
-    """`exact_tangent` made positive semidefinite, for conjugate gradients to descend from anywhere.
+    """Returns `exact_tangent` made positive semidefinite, so that conjugate gradients descend from every state.
 
-    R turns in three twist modes T only, Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ), in which `held_tangent` has no stiffness. The exact
-    one is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ): the geometric stiffness. Where it is negative, 0 is taken.
+    R turns only in the three twist modes T: Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ). `held_tangent` has no stiffness in these modes.
+    The exact (geometric) stiffness is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ). A negative one is replaced by 0.
 
     Args:
         gradients: F, shape (m, 3, 3).
@@ -164,7 +168,7 @@ def projected_tangent(
 
 
 def stiffness_diagonal(elements: Elements) -> jax.Array:
-    """The mean of the three diagonal entries of the held stiffness matrix at each vertex, shape (n,), N/m.
+    """Returns the mean of the three diagonal entries of the held stiffness matrix at each vertex, shape (n,), N/m.
 
     It does not depend on R: the trace of μ |b|² 1 + (μ + λ) Rb (Rb)ᵀ is (4 μ + λ) |b|².
     """
@@ -177,7 +181,7 @@ def stiffness_diagonal(elements: Elements) -> jax.Array:
 
 
 def _strain(gradients: jax.Array, rotations: jax.Array) -> jax.Array:
-    """ε = sym(RᵀF) − 1 as sym(Rᵀ(F − R)), which keeps its digits where the strain is small."""
+    """ε = sym(RᵀF) − 1, computed as sym(Rᵀ(F − R)), which is accurate for a small strain."""
     return _symmetric_part(gradients - rotations, rotations)
 
 

@@ -1,4 +1,4 @@
-"""The scenes of co-rotational finite elements, and what is watched in them."""
+"""The scenes of co-rotational finite elements, and their monitored scalars."""
 
 import functools
 from collections.abc import Callable
@@ -18,13 +18,13 @@ _GRAVITY = 9.81
 
 
 def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
-    """Energies, the linear momentum of a body that is free, and the worst element's numbers."""
+    """Returns energies, the linear momentum, and the worst gap and orthogonality over the elements."""
     elements = parameters.elements
     s = signed_singular_values(deformation_gradients(state.positions, elements))
     shear = elements.shear_modulus * jnp.sum((s - 1) ** 2, axis=-1)
     density = shear + 0.5 * elements.lame_first * (jnp.sum(s, axis=-1) - 3) ** 2
     squares = jnp.sum(state.velocities**2, axis=-1)
-    # Of an element with all vertices at one point nothing is determined.
+    # The gap of an element with all vertices at one point is 0: it determines no rotation.
     gap = jnp.where(s[:, 0] > 0, (s[:, 1] + s[:, 2]) / jnp.where(s[:, 0] > 0, s[:, 0], jnp.ones_like(s[:, 0])), 0)
     columns = state.rotations[:, :, :, None] * state.rotations[:, :, None, :]
     defect = jnp.sum(columns, axis=1) - jnp.broadcast_to(jnp.eye(3, dtype=s.dtype), state.rotations.shape)
@@ -40,11 +40,11 @@ def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
 
 
 def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
-    """A beam clamped at its lower end along the first axis, that its own weight bends far down.
+    """Returns the scene of a beam that is clamped at its lower end along the first axis, and bends by its own weight.
 
     Args:
-        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), bent instead; as stiff as makes a beam of these
-            lengths sag by about its length, at a time step that fits its size.
+        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), of another body. Its stiffness is such that a
+            beam of these lengths sags by about its length. The time step fits its size.
 
     Raises:
         ValueError: An unusable mesh.
@@ -56,7 +56,7 @@ def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
     time_step = 0.037 * (length / _GRAVITY) ** 0.5
     state, parameters = corotational.build(
         *body,
-        # Euler and Bernoulli's deflection would be 1.5 times the length.
+        # By Euler and Bernoulli the deflection would be 1.5 times the length.
         young=_DENSITY * _GRAVITY * length**3 / height**2,
         density=_DENSITY,
         time_step=time_step,
@@ -74,7 +74,7 @@ def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
 
 
 def recovery(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
-    """A free block whose vertices were thrown about at random, half of the elements inverted, recovers its shape.
+    """Returns the scene of a free block that recovers its shape from random vertices, half of the elements inverted.
 
     Args:
         mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), instead of a cube of 1 m.
@@ -113,7 +113,7 @@ def _scene(
 
     def watched(state: State) -> dict[str, jax.Array]:
         values = health(state, parameters)
-        # A clamp takes up momentum: nothing is conserved.
+        # A clamp takes up momentum, so linear momentum is not conserved and not monitored.
         return {name: value for name, value in values.items() if not (clamped and name.startswith("linear momentum"))}
 
     return Scene(

@@ -1,4 +1,4 @@
-"""The body rates of a free, asymmetric top: they repeat."""
+"""The periodic body rates of a free, asymmetric top."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -7,12 +7,12 @@ _SUBSTEPS = 8
 
 
 def tumbling_rates(inertia: ArrayLike, rates: ArrayLike, period_steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """One period of Euler's equations I ω' = (I ω) × ω without torque, cut into steps.
+    """Returns the body rates over one period of Euler's equations I ω' = (I ω) × ω without torque.
 
     Args:
         inertia: Principal moments, kg m², ascending, shape (3,).
         rates: Body rates ω at the start, rad/s, shape (..., 3).
-        period_steps: Into how many steps the period is cut.
+        period_steps: The number of steps in a period.
 
     Returns:
         The rates in the middle of every step, rad/s, shape (period_steps, ..., 3), and the time step, s, shape (...).
@@ -45,7 +45,7 @@ def _period(moments: np.ndarray, w: np.ndarray) -> np.ndarray:
     twice_energy, momentum = np.sum(moments * w**2, axis=-1), np.sum((moments * w) ** 2, axis=-1)
     low, high = momentum - twice_energy * moments[0], twice_energy * moments[2] - momentum
     middle = momentum - twice_energy * moments[1]
-    # About which of the two stable axes the rates circle; the roles of the moments change with it.
+    # The rates circle about one of the two stable axes, which decides the roles of the moments.
     gaps = np.diff(moments)
     numerator = np.where(middle >= 0, gaps[0] * high, gaps[1] * low)
     denominator = np.where(middle >= 0, gaps[1] * low, gaps[0] * high)

@@ -1,4 +1,4 @@
-"""Mesh files of the user's, in any format that meshio reads."""
+"""Mesh files of the user, in any format that meshio reads."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def read(path: Path) -> Any:
-    """What meshio finds in the file, a `meshio.Mesh`.
+    """Returns the content of the file, a `meshio.Mesh`.
 
     Raises:
         ValueError: meshio is not installed, the file is missing or cannot be read.
@@ -18,7 +18,7 @@ def read(path: Path) -> Any:
         import meshio
     except ImportError:
         raise ValueError("meshio is not installed; expected: pip install 'jaxrot[scenes]'") from None
-    # meshio prints what goes wrong, and ends the process.
+    # meshio prints its errors and ends the process: capture both.
     messages = io.StringIO()
     try:
         with contextlib.redirect_stdout(messages), contextlib.redirect_stderr(messages):
@@ -30,7 +30,7 @@ def read(path: Path) -> Any:
 
 
 def vertices(path: Path) -> np.ndarray:
-    """The vertices in the file, float64 of shape (n, 3).
+    """Returns the vertices in the file, float64 of shape (n, 3).
 
     Raises:
         ValueError: It cannot be read, or has none.

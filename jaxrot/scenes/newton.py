@@ -1,4 +1,4 @@
-"""The minimum of inertia and elastic energy by Newton's method, matrix-free conjugate gradients inside."""
+"""Minimisation of inertia and elastic energy by Newton's method with matrix-free conjugate gradients."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from jaxrot.scenes.elasticity import Elements
 
 
 class Choices(NamedTuple):
-    """How a step is solved; static. What each means: `corotational.step`."""
+    """The static options of the solver, see `corotational.step`."""
 
     rotation: str = "torque"
     iterations: int | None = 3
@@ -30,7 +30,7 @@ class Problem(NamedTuple):
     """The potential ½ Σ c |u|² − uᵀf + E(x + u) of a displacement u.
 
     Attributes:
-        elements: What E is the energy of.
+        elements: The elements, with the energy E.
         start: x, shape (n, 3), m.
         inertia: c, shape (n,), kg/s².
         load: f, shape (n, 3), N.
@@ -45,7 +45,7 @@ class Problem(NamedTuple):
 
 
 def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[jax.Array, jax.Array]:
-    """The displacement after a fixed number of Newton iterations from 0, and the rotations at the last of them."""
+    """Returns the displacement after a fixed number of Newton iterations from 0, and the rotations at the last one."""
 
     def iteration(_: int, carry: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         return _newton_iteration(problem, *carry, choices)[:2]
@@ -57,7 +57,7 @@ def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[
 
 
 def residuals(problem: Problem, rotations: jax.Array, choices: Choices) -> jax.Array:
-    """The norm of the gradient of the potential before each of the iterations, shape (newton_iterations,), N."""
+    """Returns the norm of the potential's gradient before each iteration, shape (newton_iterations,), N."""
 
     def iteration(carry: tuple[jax.Array, jax.Array], _: None) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
         displacement, rotations, force = _newton_iteration(problem, *carry, choices)
@@ -70,7 +70,7 @@ def residuals(problem: Problem, rotations: jax.Array, choices: Choices) -> jax.A
 def _newton_iteration(
     problem: Problem, displacement: jax.Array, rotations: jax.Array, choices: Choices
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """The next displacement; the rotations and the force at the present one."""
+    """Returns the next displacement, and the rotations and the force at the present one."""
     elements = problem.elements
     gradients = elasticity.deformation_gradients(problem.start + displacement, elements)
     rotations = _rotations(gradients, rotations, choices)
@@ -100,10 +100,10 @@ def _rotations(gradients: jax.Array, rotations: jax.Array, choices: Choices) -> 
 def _solve(
     stiffness: Callable[[jax.Array], jax.Array], force: jax.Array, problem: Problem, choices: Choices
 ) -> jax.Array:
-    """The displacement by conjugate gradients, scaled by the square root of the diagonal of the matrix.
+    """Returns the displacement by conjugate gradients, preconditioned with the square root of the diagonal.
 
-    Unknowns and right-hand side get the size 1, whatever the units: the squares of forces of 1e11 N, or of lengths in
-    nanometres, are outside of float32. What is scaled out again needs no derivative.
+    The unknowns and the right-hand side are scaled to the size 1. The squares of forces of 1e11 N, or of lengths in
+    nanometres, are outside the range of float32. The scales cancel, so they are not differentiated.
     """
     diagonal = problem.inertia + elasticity.stiffness_diagonal(problem.elements)
     scale = lax.stop_gradient(problem.free / jnp.sqrt(diagonal))[:, None]
@@ -122,7 +122,7 @@ def _solve(
 def _step_length(
     problem: Problem, displacement: jax.Array, change: jax.Array, rotations: jax.Array, choices: Choices
 ) -> jax.Array:
-    """The largest of 1, ½, ¼, … at which the potential does not increase, the smallest if there is none."""
+    """Returns the largest of 1, ½, ¼, … at which the potential does not increase, or the smallest if it always does."""
 
     def potential(length: jax.Array) -> tuple[jax.Array, jax.Array]:
         total = displacement + length * change
@@ -135,7 +135,7 @@ def _step_length(
     lengths = 0.5 ** jnp.arange(choices.line_search + 1).astype(change.dtype)
     before, magnitude = potential(jnp.zeros_like(lengths[0]))
     after, _ = lax.map(potential, lengths)
-    # Near the minimum the potential changes by less than its own rounding, and the full step is right.
+    # Allow an increase within rounding: near the minimum the potential changes by less, and the full step is right.
     allowed = before + 32 * jnp.finfo(change.dtype).eps * magnitude
     accepted = after <= allowed
     return jnp.where(jnp.any(accepted), lengths[jnp.argmax(accepted)], lengths[-1])

@@ -1,4 +1,4 @@
-"""What a scene gives to whoever runs it: the command, a notebook, a test."""
+"""The interface of a scene, for the command, the notebooks and the tests."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-# Of a vertex, in any unit: volumes of larger bodies would overflow in float64, and LAPACK may hang on an infinity.
+# The limit for a vertex, in any unit. Volumes of larger bodies overflow in float64, and LAPACK may hang on an infinity.
 LARGEST_COORDINATE = 1e100
 
 State = Any  # a NamedTuple of arrays, the scene's own
@@ -16,14 +16,14 @@ class Scene(NamedTuple):
     """A scene ready to run: its first state, and pure functions of a state.
 
     Attributes:
-        title: One line, for the head of its pictures.
+        title: One line, the title of its pictures.
         state: The first state.
-        step: State to state: pure, with parameters and static choices bound. A valid body for `lax.scan`.
-        health: State to named scalars that are watched, each with its unit in the name: "kinetic energy (J)".
+        step: State to state: pure, with parameters and static options bound. A valid body for `lax.scan`.
+        health: State to the scalars that are monitored, by name. Each name ends with the unit: "kinetic energy (J)".
         points: State to the points to draw, shape (n, 3), the third axis up.
-        lines: Pairs of point indices to draw as lines, shape (m, 2); empty: the points are drawn.
+        lines: Pairs of point indices to draw as lines, shape (m, 2); if empty, the points are drawn.
         step_seconds: Simulated seconds a step.
-        steps: How many steps make the scene worth looking at.
+        steps: The number of steps that shows the effect of the scene.
     """
 
     title: str
@@ -37,9 +37,9 @@ class Scene(NamedTuple):
 
 
 def flops(function: Callable[..., Any], *arguments: Any) -> float:
-    """The floating-point operations that XLA counts in the compiled function: what a static choice leaves out.
+    """Returns the number of floating-point operations that XLA counts in the compiled function.
 
-    Loops count once, whatever their number of iterations.
+    It shows what a static option leaves out. A loop counts once, whatever its number of iterations.
     """
     cost = jax.jit(function).lower(*arguments).compile().cost_analysis() or {}
     return float(cost["flops"])

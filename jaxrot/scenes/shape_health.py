@@ -1,4 +1,4 @@
-"""What is watched while a body of clusters moves."""
+"""Monitored scalars of a body of clusters: energies, momenta, rotations and shape."""
 
 import jax
 import jax.numpy as jnp
@@ -10,14 +10,14 @@ from jaxrot.scenes.shape_matching import Parameters, State, fit_clusters, turned
 
 
 def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
-    """Energies, momenta, how well the rotations are determined and kept, and the distance from the shape at rest.
+    """Returns energies, momenta, the smallest gap and worst defect of the rotations, and the error of the shape.
 
     Args:
-        state: Now.
+        state: The state now.
         parameters: Of the same dtype.
 
     Returns:
-        Scalars by name. The elastic energy is α/(2h²) Σ m |g − x|², whose gradient the pull towards the goals is; the
+        Scalars by name. The elastic energy is α/(2h²) Σ m |g − x|²; its gradient is the force towards the goals. The
         angular momentum is about the centre of mass.
     """
     body = parameters.body
@@ -44,7 +44,7 @@ def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
 
 
 def shape_error(positions: jax.Array, rest_positions: jax.Array) -> jax.Array:
-    """The RMS distance from the shape at rest, moved and turned onto it, over the diagonal of its bounding box."""
+    """The RMS distance from the best fit of the shape at rest, divided by the diagonal of its bounding box."""
     x = positions - jnp.mean(positions, axis=0, keepdims=True)
     q = rest_positions - jnp.mean(rest_positions, axis=0, keepdims=True)
     rotation = nearest_rotation(jnp.sum(x[:, :, None] * q[:, None, :], axis=0))
@@ -54,6 +54,6 @@ def shape_error(positions: jax.Array, rest_positions: jax.Array) -> jax.Array:
 
 
 def _length(vector: jax.Array) -> jax.Array:
-    # Squares of a momentum overflow long before the momentum does.
+    # Divide by the largest component first: the square of a momentum overflows long before the momentum does.
     largest = jnp.max(jnp.abs(vector))
     return largest * jnp.sqrt(jnp.sum(safe_divide(vector, jnp.broadcast_to(largest, vector.shape)) ** 2))

@@ -1,4 +1,7 @@
-"""Clustered shape matching: every cluster draws its vertices to its rest shape, moved and turned to fit them.
+"""Clustered shape matching: every cluster moves its vertices towards its rest shape, fitted to them.
+
+A step changes velocities by α (g − x)/h for goals g, then positions by the new velocities (2005, eqs. 9 and 10). A
+vertex takes the mean change of its clusters.
 
 Source: Müller et al. 2005, "Meshless deformations based on shape matching"; Müller et al. 2016, sections 1 and 4.
 """
@@ -20,12 +23,12 @@ from jaxrot.scenes.contact import Contact, Motion, build_contact, stand_on_groun
 
 @exportable
 class State(NamedTuple):
-    """What moves.
+    """The state of the body.
 
     Attributes:
         positions: Of the vertices, m, shape (n, 3).
         velocities: Of the vertices, m/s, shape (n, 3).
-        rotations: Of the clusters, from rest, shape (c, 3, 3): where the next step starts from.
+        rotations: Of the clusters, from rest, shape (c, 3, 3): the warm start of the next step.
     """
 
     positions: jax.Array
@@ -35,15 +38,16 @@ class State(NamedTuple):
 
 @exportable
 class Parameters(NamedTuple):
-    """What does not.
+    """The parameters, which a step does not change.
 
     Attributes:
-        body: Its shape at rest, its masses, its clusters.
+        body: The shape at rest, the masses and the clusters.
         time_step: s, shape ().
-        stiffness: Part of the way to its goal that a vertex goes in a step, 0 to 1, shape ().
-        damping: Part of the velocity beside the clusters' rigid motions that a step takes away, 0 to 1, shape ().
+        stiffness: The fraction of the way to its goal that a vertex moves in a step, 0 to 1, shape ().
+        damping: The fraction that a step removes of the velocities relative to the clusters' rigid motions, 0 to 1,
+            shape ().
         gravity: m/s², shape (3,).
-        contact: What the vertices may touch.
+        contact: The obstacles, and how vertices respond to them.
     """
 
     body: Body
@@ -56,7 +60,7 @@ class Parameters(NamedTuple):
 
 @exportable
 class ClusterFit(NamedTuple):
-    """How the clusters lie.
+    """The positions of the vertices relative to their clusters, and the matrices whose rotations are extracted.
 
     Attributes:
         arms: Places from their cluster's centre of mass, m, shape (c, s, 3).
@@ -76,7 +80,7 @@ def build_parameters(
     gravity: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     contact: Contact | None = None,
 ) -> Parameters:
-    """Parameters in the dtype of the body.
+    """Returns parameters in the dtype of the body.
 
     Raises:
         ValueError: A time step that is not positive, a stiffness or damping outside 0 to 1, a gravity that is no finite
@@ -95,10 +99,10 @@ def build_parameters(
 
 
 def build_state(body: Body, positions: ArrayLike | None = None, velocities: ArrayLike | None = None) -> State:
-    """A first state, every rotation the identity.
+    """Returns the first state, with identity rotations.
 
     Args:
-        body: What moves.
+        body: The body.
         positions: m, shape (n, 3); those at rest if not given.
         velocities: m/s, shape (n, 3); 0 if not given.
 
@@ -128,42 +132,48 @@ def step(
     box: bool = False,
     obstacle: bool = False,
 ) -> State:
-    """The state one time step later; what a static choice switches off is not in the compiled program.
+    """Returns the state one time step later, by shape matching of clusters.
 
-    Velocities change by α (g − x)/h towards the goals g, then positions by the new velocities (2005, eqs. 9 and 10). A
-    vertex in several clusters takes the mean of what they want of it.
+    All options are static; the program leaves out what is off.
 
     Args:
-        state: Now.
+        state: The state now.
         parameters: Of the same dtype.
-        rotation_step: A name in `jaxrot.STEPS`, for the warm start. Static.
-        iterations: How many of them. Static.
-        method: A name in `jaxrot.METHODS`: the rotations are computed anew in every step. Static.
-        derivative: That of the warm-started rotation, see `refine_rotation`. Static.
-        damping: Whether velocities beside each cluster's rigid motion are damped. Static.
-        conserve_angular_momentum: Take the torque out of what a cluster wants of its vertices. It has none where its
-            rotation has converged; one `torque` iteration lags behind a body that turns, and brakes it. Static.
-        ground: Contact with the ground. Static.
-        box: Contact with the walls of the box, from inside. Static.
-        obstacle: Contact with the obstacle, from outside. Static.
+        rotation_step: A name in `jaxrot.STEPS`, for the warm start.
+        iterations: The number of these steps.
+        method: A name in `jaxrot.METHODS`, from a cold start instead.
+        derivative: See `refine_rotation`.
+        damping: Damp velocities relative to each cluster's rigid motion.
+        conserve_angular_momentum: Remove the torque from each cluster's changes. It is 0 for a converged rotation; one
+            `torque` iteration lags behind a body that turns, and brakes it.
+        ground: Contact with the ground.
+        box: Contact with the walls of the box, from inside.
+        obstacle: Contact with the obstacle, from outside.
 
     Returns:
-        The next state, dtypes and shapes of `state`: a carry of `lax.scan`.
+        The next state, a carry of `lax.scan`. A `method` that is not for singular matrices gives NaN for a cluster in a
+        plane, on a line or in one point.
 
     Raises:
         ValueError: Unknown step, method or derivative, negative iterations.
 
-    Conservation:
-        Of linear momentum always, of angular momentum with `conserve_angular_momentum`: both to 1e-6 in 1,000 free
-        steps in float32. Without it to 2e-5 where the rotations converge. Not of energy: damping takes it; undamped
-        its mean stays where the rotations converge, and a rotation that lags may pump.
-
-    Limits:
-        A `method` that is not for singular matrices gives NaN for a cluster of one vertex, on a line or in a plane.
-
     Derivative:
-        Forward and reverse, with respect to the state and the parameters. That of the rotation is right where it has
-        converged; where not, `derivative="unrolled"`.
+        Forward and reverse, with respect to state and parameters. Right if the rotations have converged, otherwise with
+        `derivative="unrolled"`.
+
+    Accuracy:
+        Linear momentum is conserved, angular momentum with `conserve_angular_momentum`: to 1e-6 in 1,000 free float32
+        steps. Otherwise angular momentum is conserved to 2e-5 if the rotations converge. Damping removes energy.
+        Undamped, the mean energy is constant if the rotations converge; a rotation that lags may add energy.
+
+    Example:
+        >>> import jax.numpy as jnp, numpy as np
+        >>> from jaxrot.scenes import body, shape_matching
+        >>> cube = body.build_body(np.array(list(np.ndindex(2, 2, 2))), [range(8)])
+        >>> stretched = shape_matching.build_state(cube, cube.rest_positions * jnp.array([[1.2, 1.0, 1.0]]))
+        >>> after = shape_matching.step(stretched, shape_matching.build_parameters(cube))
+        >>> [round(x, 3) for x in jnp.ptp(after.positions, axis=0).tolist()]
+        [1.0, 1.0, 1.0]
     """
     body, h = parameters.body, parameters.time_step
     shares = body.shares[..., None]
@@ -174,13 +184,14 @@ def step(
         )
     else:
         rotations = nearest_rotation(fit.matrices, method=method)
-    # Divided last: a quotient XLA:CPU computes once, a product anew for every sum that it goes into.
+    # The division comes last: XLA:CPU computes a quotient once, but recomputes a product for every sum that uses it.
     changes = parameters.stiffness * (turned_offsets(rotations, body) - fit.arms) / h
     drag = -parameters.damping * state.velocities[body.members] if damping else None
     if conserve_angular_momentum:
         changes = without_momentum(changes if drag is None else changes + drag, fit.arms, shares)
     else:
-        # The centre of mass is rounded to eps of its distance from the origin, and divided by h that is a push.
+        # Remove the mean. The centre of mass is rounded to eps of its distance from the origin; divided by h, that
+        # error would push the whole cluster.
         changes = changes - jnp.sum(shares * changes, axis=1, keepdims=True)
         changes = changes if drag is None else changes + without_momentum(drag, fit.arms, shares)
     velocities = state.velocities + mean_over_clusters(changes, body) + (h * parameters.gravity)[None]
@@ -192,7 +203,7 @@ def step(
 
 
 def fit_clusters(positions: jax.Array, body: Body) -> ClusterFit:
-    """A_pq = Σ w (x − x̄) qᵀ of every cluster, over its mass (2005, eq. 7)."""
+    """Returns A_pq = Σ w (x − x̄) qᵀ of every cluster, divided by its mass (2005, eq. 7)."""
     shares = body.shares[..., None]
     places = positions[body.members]
     arms = places - jnp.sum(shares * places, axis=1, keepdims=True)
@@ -200,13 +211,13 @@ def fit_clusters(positions: jax.Array, body: Body) -> ClusterFit:
 
 
 def turned_offsets(rotations: jax.Array, body: Body) -> jax.Array:
-    """The places at rest, turned as their clusters are: shape (c, s, 3)."""
+    """Returns the offsets at rest, rotated with their clusters, shape (c, s, 3)."""
     return jnp.sum(rotations[:, None] * body.offsets[..., None, :], axis=-1)
 
 
 def mean_over_clusters(changes: jax.Array, body: Body) -> jax.Array:
-    """What the clusters of every vertex want of it, on average: (c, s, 3) to (n, 3)."""
-    # A gather through the table of places: a scatter takes XLA:CPU several times as long, and its sums have no order.
+    """Returns for every vertex the mean of the changes in its clusters: (c, s, 3) to (n, 3)."""
+    # Gather through the table of places. A scatter takes XLA:CPU several times as long, and has no fixed order of sums.
     rows = changes.reshape(-1, 3)
     nowhere = jnp.zeros((1, 3), changes.dtype)
     gathered = jnp.concatenate([rows, nowhere])[body.places]

@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra: boxes, files of the user's, their checks, and what finite elements need of them."""
+"""Meshes of tetrahedra: boxes, files of the user, validation, and quantities for finite elements."""
 
 import itertools
 from pathlib import Path
@@ -25,7 +25,7 @@ class Mesh(NamedTuple):
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
-    """A box from the origin, each of its cells divided into six tetrahedra around the cell's diagonal.
+    """Returns a box from the origin; each cell is divided into six tetrahedra around its diagonal.
 
     The tetrahedra of neighbouring cells match without alternating patterns (Kuhn 1960).
 
@@ -39,20 +39,20 @@ def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
     grid = np.stack(np.meshgrid(*(np.arange(count) for count in counts), indexing="ij"), axis=-1)
     strides = np.array([counts[1] * counts[2], counts[2], 1])
     first = (grid[:-1, :-1, :-1] @ strides).reshape(-1, 1)
-    # From one end of the diagonal to the other, along the three axes in every order.
+    # Each tetrahedron is a path from one end of the diagonal to the other, along the three axes in one of six orders.
     paths = [np.cumsum([0, *strides[list(order)]]) for order in itertools.permutations(range(3))]
     vertices = grid.reshape(-1, 3) * (np.array(size) / np.array(cells))
     return checked(vertices, np.concatenate([first + path for path in paths]))
 
 
 def read(path: Path) -> Mesh:
-    """The tetrahedra in a mesh file; vertices of no tetrahedron are left out.
+    """Returns the tetrahedra in a mesh file. Vertices of no tetrahedron are left out.
 
     Raises:
         ValueError: It cannot be read, or the mesh is unusable.
     """
     content = mesh_file.read(path)
-    # Quadratic tetrahedra have their corners first.
+    # Take the first four: quadratic tetrahedra list their corners first.
     cells = [block.data[:, :_CORNERS] for block in content.cells if block.type in ("tetra", "tetra10")]
     if not cells:
         kinds = ", ".join(sorted({block.type for block in content.cells})) or "none"
@@ -62,10 +62,10 @@ def read(path: Path) -> Mesh:
 
 
 def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
-    """The mesh with every tetrahedron turned so that its volume is positive.
+    """Validates a mesh, and orients every tetrahedron so that its volume is positive.
 
     Raises:
-        ValueError: No tetrahedra, wrong shapes, an index of no vertex, a vertex that is not finite, too far away or of
+        ValueError: No tetrahedra, wrong shapes, an index out of range, a vertex that is not finite, too far away or in
             no tetrahedron, a flat tetrahedron.
     """
     vertices, tetrahedra = np.asarray(vertices), np.asarray(tetrahedra)
@@ -90,7 +90,7 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
         raise ValueError(f"vertex {alone[0]} belongs to no tetrahedron, it would have no mass")
     mesh = _with_positive_volumes(Mesh(vertices.astype(np.float64), tetrahedra.astype(np.int32)))
     edges = edge_matrices(mesh)
-    # Relative to the longest edge: a mesh in micrometres is no flatter than one in kilometres.
+    # Compare with the longest edge, so that the limit does not depend on the unit of length.
     flat = np.linalg.det(edges) <= 1e-9 * np.linalg.norm(edges, axis=-2).max(axis=-1) ** 3
     if flat.any():
         raise ValueError(f"tetrahedron {int(np.argmax(flat))} is flat, {int(flat.sum())} of {len(flat)} are")
@@ -115,13 +115,13 @@ def volumes(mesh: Mesh) -> np.ndarray:
 
 
 def lumped_masses(mesh: Mesh, density: np.ndarray | float) -> np.ndarray:
-    """A quarter of the mass of each tetrahedron to each of its corners: shape (n,), kg."""
+    """Returns the mass of each vertex, a quarter of each of its tetrahedra, shape (n,), kg."""
     quarter = np.broadcast_to(density * volumes(mesh) / _CORNERS, (_CORNERS, len(mesh.tetrahedra)))
     return np.bincount(mesh.tetrahedra.T.ravel(), weights=quarter.ravel(), minlength=len(mesh.vertices))
 
 
 def surface_edges(mesh: Mesh) -> np.ndarray:
-    """The edges of the triangles that belong to one tetrahedron: pairs of vertices, shape (k, 2)."""
+    """Returns the edges of the triangles that belong to one tetrahedron only: pairs of vertices, shape (k, 2)."""
     faces = np.concatenate([mesh.tetrahedra[:, list(face)] for face in itertools.combinations(range(_CORNERS), 3)])
     triangles, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
     outer = triangles[count == 1]

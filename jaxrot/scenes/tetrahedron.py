@@ -1,7 +1,7 @@
-"""The tetrahedron of Figs. 3 to 5: its tip is pushed through the base, and the rotation follows from frame to frame.
+"""The tetrahedron of Figs. 3 to 5: its tip is pushed through the base, and each frame refines the rotation of the last.
 
-Source: Müller et al. 2016, section 4. The paper gives no shape; for the deformation gradient only the slant matters,
-the angle between the path and the normal of the base.
+Source: Müller et al. 2016, section 4. The paper gives no shape. The deformation gradient depends only on the slant, the
+angle between the path and the normal of the base.
 """
 
 from typing import NamedTuple
@@ -26,11 +26,11 @@ _FRAMES = 320
 
 @exportable
 class State(NamedTuple):
-    """What moves.
+    """The rotation of one frame.
 
     Attributes:
-        rotation: The rotation extracted in this frame, the start of the next one's, shape (3, 3).
-        frame: Its number, int32, shape ().
+        rotation: Extracted in this frame, the start of the next one, shape (3, 3).
+        frame: The number of the frame, int32, shape ().
     """
 
     rotation: jax.Array
@@ -39,13 +39,13 @@ class State(NamedTuple):
 
 @exportable
 class Parameters(NamedTuple):
-    """What does not.
+    """The tetrahedron and the path of its tip, which a step does not change.
 
     Attributes:
-        tip_path: Place of the tip in every frame, m, shape (frames, 3); after the last it stays.
+        tip_path: The tip in every frame, m, shape (frames, 3). It stays where it is after the last.
         base: The three fixed vertices, m, shape (3, 3), a vertex a row.
-        shape: What makes A of the edges [x₁−x₀ x₂−x₀ x₃−x₀]: A = edges · shape, shape (3, 3). For the deformation
-            gradient the inverse of the edges at rest, 1/m; for shape matching that times Σ x̄ x̄ᵀ, m.
+        shape: The factor of A = edges · shape for the edges [x₁−x₀ x₂−x₀ x₃−x₀], shape (3, 3). For the deformation
+            gradient it is the inverse of the edges at rest, 1/m; for shape matching that times Σ x̄ x̄ᵀ, m.
     """
 
     tip_path: jax.Array
@@ -65,7 +65,9 @@ def slanted_tetrahedron(slant: float = SLANT, radius: float = RADIUS) -> np.ndar
 
 
 def pushed_through(frames: int = _FRAMES) -> np.ndarray:
-    """The tip on the x-axis from 1 through the base at 0 to −1, its mirror image: for that tetrahedron x = det F.
+    """Returns the path of the tip on the x-axis from 1 through the base at 0 to its mirror image at −1.
+
+    For `slanted_tetrahedron` x = det F.
 
     Returns:
         The path, shape (frames + 1, 3).
@@ -78,13 +80,13 @@ def pushed_through(frames: int = _FRAMES) -> np.ndarray:
 def build(
     rest: ArrayLike, tip_path: ArrayLike, *, matrix: str = "deformation_gradient", dtype: type = np.float32
 ) -> tuple[State, Parameters]:
-    """A tetrahedron and the path of its tip; the first rotation is the identity.
+    """Returns the first state, with the identity, and the parameters of a tetrahedron and the path of its tip.
 
     Args:
         rest: Vertices at rest, the tip last, m, shape (4, 3).
-        tip_path: Place of the tip in every frame, m, shape (frames, 3).
-        matrix: What the rotation is taken of: "deformation_gradient", or "shape_matching", Σ x x̄ᵀ over the four
-            vertices, from their mean.
+        tip_path: The tip in every frame, m, shape (frames, 3).
+        matrix: The matrix whose rotation is extracted: "deformation_gradient", or "shape_matching", Σ x x̄ᵀ over the
+            four vertices relative to their mean.
         dtype: Of all arrays, float32 or float64.
 
     Raises:
@@ -113,13 +115,13 @@ def build(
 
 
 def vertices_in(parameters: Parameters, frame: jax.Array) -> jax.Array:
-    """The four vertices in a frame, the tip last, m, shape (4, 3)."""
+    """Returns the four vertices in a frame, the tip last, m, shape (4, 3)."""
     last = len(parameters.tip_path) - 1
     return jnp.concatenate([parameters.base, parameters.tip_path[jnp.minimum(frame, last)][None]])
 
 
 def matrix_in(parameters: Parameters, frame: jax.Array) -> jax.Array:
-    """The matrix whose rotation is wanted in a frame, shape (3, 3)."""
+    """Returns the matrix whose rotation is extracted in a frame, shape (3, 3)."""
     vertices = vertices_in(parameters, frame)
     edges = vertices[1:] - vertices[:1]
     return jnp.sum(edges[:, :, None] * parameters.shape[:, None, :], axis=0)
@@ -134,27 +136,33 @@ def step(
     escape: bool = False,
     method: str | None = None,
 ) -> State:
-    """The next frame: the tip moves on, and the rotation of the matrix is extracted.
+    """Returns the state one frame later: the tip moves on, and the rotation of the matrix is extracted.
 
     Args:
         state: See `State`.
         parameters: See `Parameters`.
         rotation_step: A name in `STEPS`, run from the rotation of the last frame. Static.
-        iterations: How many. Static.
-        escape: Leave a half turn off the solution, see `refine_rotation`. Static.
-        method: A name in `METHODS`, run from nothing, in place of those steps; None for them. Static.
+        iterations: The number of these steps. Static.
+        escape: Leave a start half a turn from the solution, see `refine_rotation`. Static.
+        method: A name in `METHODS`, run from a cold start instead of the steps, or None. Static.
 
     Raises:
         ValueError: Unknown step or method, negative iterations.
 
-    Derivative: With the steps it is that of what was computed, through all frames, with a method that of the nearest
-        rotation.
+    Derivative:
+        With steps that of the computation, through all frames; with a method that of the nearest rotation.
+
+    Example:
+        >>> from jaxrot.scenes import tetrahedron
+        >>> first, parameters = tetrahedron.build(tetrahedron.slanted_tetrahedron(), tetrahedron.pushed_through())
+        >>> tetrahedron.step(first, parameters).frame.item()
+        1
     """
     frame = state.frame + 1
     matrix = matrix_in(parameters, frame)
     if method is not None:
         return State(nearest_rotation(matrix, method=method), frame)
-    # Unrolled: one iteration a frame has not converged, and the rule of the limit would be wrong.
+    # Unrolled: one iteration a frame does not converge, and the implicit derivative would be wrong.
     rotation = refine_rotation(
         matrix, state.rotation, step=rotation_step, iterations=iterations, escape=escape, derivative="unrolled"
     )
@@ -170,7 +178,7 @@ def follow(
     escape: bool = False,
     method: str | None = None,
 ) -> jax.Array:
-    """The rotations of all frames of the path, the first as given, shape (frames, 3, 3); the choices are `step`'s."""
+    """Returns the rotations of all frames, the first as given, shape (frames, 3, 3); options as for `step`."""
 
     def advance(now: State, _: None) -> tuple[State, jax.Array]:
         after = step(now, parameters, rotation_step=rotation_step, iterations=iterations, escape=escape, method=method)
@@ -181,13 +189,13 @@ def follow(
 
 
 def angle_between(rotation: jax.Array, other: jax.Array) -> jax.Array:
-    """The angle of the rotation from one to the other, rad, shape (...)."""
+    """Returns the angle of the rotation from one to the other, rad, shape (...)."""
     chord = safe_sqrt(jnp.sum((rotation - other) ** 2, axis=(-2, -1)) / 8)
     return 2 * jnp.arcsin(jnp.minimum(chord, 1))
 
 
 def tetrahedron() -> Scene:
-    """The tetrahedron of Fig. 3, pushed through its base in 320 frames; its axes by one torque iteration a frame."""
+    """Returns the scene of Fig. 3: the tip is pushed through the base in 320 frames of one torque iteration each."""
     start, parameters = build(slanted_tetrahedron(), pushed_through())
 
     def health(state: State) -> dict[str, jax.Array]:

@@ -1,4 +1,4 @@
-"""Cold-start solvers, one algorithm a file, and their registry."""
+"""Solvers for the nearest rotation from a cold start, one algorithm a file, and their registry."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -29,18 +29,18 @@ from jaxrot.solvers import (
 
 
 class Method(NamedTuple):
-    """A solver and its domain.
+    """A method of `nearest_rotation`: a solver and its domain.
 
     Attributes:
-        solve: From a matrix on components, its largest entry scaled into [2, 4) by a power of two, to a rotation on
-            components. Scaling before and stacking after happen outside. It carries no derivative rule.
-        exact: It computes the nearest rotation to rounding, not an approximation of it.
-        handles_inversion: Right for det A < 0 too.
-        condition_limit: By dtype, the largest κ = s1/(s2+s3), a power of two, up to which it keeps the numerical
-            contract of the default method (forward error 8 eps (1+κ), orthogonality 10 eps, lost trace 16 eps s1,
-            torque 128 eps s1), measured over all families that the flags admit; 0: not even near κ = 1/2, a
-            rotation's.
-        source: Where it is from.
+        solve: Maps a matrix on components to a rotation on components. A power of two has scaled its largest entry into
+            [2, 4). It has no derivative rule.
+        exact: Whether it computes the nearest rotation up to rounding, not an approximation of it.
+        handles_inversion: Whether it is right for det A < 0 too.
+        condition_limit: By dtype, the largest condition number κ = s1/(s2+s3), a power of two, up to which it keeps the
+            numerical contract of the default method: forward error 8 eps (1+κ), orthogonality 10 eps, lost trace
+            16 eps s1, torque 128 eps s1. It is measured over all families that the flags allow. 0 means that the
+            contract does not even hold near κ = 1/2, the κ of a rotation.
+        source: The publication.
     """
 
     solve: Callable[[Mat3], Mat3]
@@ -54,7 +54,7 @@ def _limit(float32: float, float64: float) -> Mapping[str, float]:
     return FrozenMapping({"float32": float32, "float64": float64})
 
 
-# The fastest of the methods that keep the whole contract, singular, inverted and extreme matrices included.
+# The fastest method that keeps the whole contract, also for singular, inverted and extreme matrices.
 DEFAULT_METHOD = "singular_pair"
 
 METHODS: Mapping[str, Method] = FrozenMapping(
