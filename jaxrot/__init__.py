@@ -27,7 +27,7 @@ from jaxrot.solvers import Method as Method
 from jaxrot.steps import STEPS as STEPS
 from jaxrot.steps import Step as Step
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "DEFAULT_METHOD",
