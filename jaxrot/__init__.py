@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from jaxrot._recommend.recommend import recommend as recommend
     from jaxrot._recommend.result import Recommendation as Recommendation
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "DEFAULT_METHOD",
