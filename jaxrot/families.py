@@ -113,18 +113,18 @@ def half_turn_starts(rotations: ArrayLike, axes: ArrayLike | None = None) -> NDA
     return np.stack(starts).astype(rotations.dtype)
 
 
-def poison(matrices: ArrayLike, seed: int = 0) -> NDArray[np.floating]:
+def with_non_finite(matrices: ArrayLike, seed: int = 0) -> NDArray[np.floating]:
     """Returns a copy of a batch (count, 3, 3) with NaN, inf or -inf in one random entry of every third matrix.
 
     Example:
-        >>> np.isfinite(poison(np.ones((4, 3, 3)))).all(axis=(1, 2)).tolist()
+        >>> np.isfinite(with_non_finite(np.ones((4, 3, 3)))).all(axis=(1, 2)).tolist()
         [False, True, True, False]
     """
-    poisoned = np.array(matrices)
-    matrix = np.arange(0, len(poisoned), 3)
+    changed = np.array(matrices)
+    matrix = np.arange(0, len(changed), 3)
     row, column = np.random.default_rng(seed).integers(0, 3, (2, len(matrix)))
-    poisoned[matrix, row, column] = np.resize((np.nan, np.inf, -np.inf), len(matrix))
-    return poisoned
+    changed[matrix, row, column] = np.resize((np.nan, np.inf, -np.inf), len(matrix))
+    return changed
 
 
 def _rotation_from_quaternion(wxyz: ArrayLike) -> NDArray[np.longdouble]:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot import METHODS
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 
 # The contract of the default method, in units of eps.
 FORWARD = 8  # times (1 + kappa), for kappa < 1/(8 eps)

@@ -12,7 +12,7 @@ from certificate import Batch, assert_contract, assert_forward_error, family_bat
 from hypothesis import strategies
 
 from jaxrot import nearest_rotation
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
 from jaxrot.report.guards import default_method
 
 DTYPES = ["float32", "float64"]

@@ -10,7 +10,7 @@ from jax.test_util import check_grads
 from parts import decomposition, dense
 
 from jaxrot import METHODS, nearest_quaternion_wxyz, nearest_rotation
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
 
 RANDOM = np.random.default_rng(0)
 DTYPES = ["float32", "float64"]

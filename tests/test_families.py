@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from jaxrot.families import FAMILIES, LARGE_BATCH, Family, half_turn_starts, poison
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
+from jaxrot.families import FAMILIES, LARGE_BATCH, Family, half_turn_starts, with_non_finite
 
 DTYPES = (np.float32, np.float64)
 COUNT = 96
@@ -199,12 +199,12 @@ def test_half_turn_starts_have_no_torque_and_their_neighbours_a_little(dtype):
 def test_poison_leaves_the_neighbours_alone():
     matrices = FAMILIES["gaussian"].sample(10).matrices
     before = matrices.copy()
-    poisoned = poison(matrices)
+    changed = with_non_finite(matrices)
     np.testing.assert_array_equal(matrices, before)
-    bad = ~np.isfinite(poisoned).all(axis=(1, 2))
+    bad = ~np.isfinite(changed).all(axis=(1, 2))
     np.testing.assert_array_equal(np.flatnonzero(bad), (0, 3, 6, 9))
-    np.testing.assert_array_equal(poisoned[~bad], matrices[~bad])
-    assert (np.count_nonzero(~np.isfinite(poisoned[bad]), axis=(1, 2)) == 1).all()
-    assert np.isnan(poisoned).any()
-    assert (poisoned == np.inf).any()
-    assert (poisoned == -np.inf).any()
+    np.testing.assert_array_equal(changed[~bad], matrices[~bad])
+    assert (np.count_nonzero(~np.isfinite(changed[bad]), axis=(1, 2)) == 1).all()
+    assert np.isnan(changed).any()
+    assert (changed == np.inf).any()
+    assert (changed == -np.inf).any()

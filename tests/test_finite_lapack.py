@@ -10,14 +10,14 @@ from jaxrot import families
 from jaxrot.__main__ import main
 from jaxrot._recommend import candidates
 from jaxrot._recommend import recommend as recommend_module
-from jaxrot.measuring.judging import judge
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.report import beside
 from jaxrot.report.inputs import read_input
 from jaxrot.report.peers import PEERS, jax_linalg
 from jaxrot.scenes import body, drop, tetrahedra, tetrahedron
 
 MATRICES = np.random.default_rng(0).standard_normal((9, 3, 3)).astype(np.float32)
-NOT_FINITE = families.poison(MATRICES)
+NOT_FINITE = families.with_non_finite(MATRICES)
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
@@ -64,7 +64,7 @@ def one_method(monkeypatch):
 
 def test_recommend_leaves_out_what_is_not_finite(one_method, monkeypatch):
     monkeypatch.setattr(recommend_module, "STEPS", {})
-    starts = families.poison(np.broadcast_to(np.eye(3, dtype=np.float32), (9, 3, 3)), seed=1)
+    starts = families.with_non_finite(np.broadcast_to(np.eye(3, dtype=np.float32), (9, 3, 3)), seed=1)
     starts = np.roll(starts, 1, axis=0)
     found = jaxrot.recommend(NOT_FINITE, tolerance=1e-3, previous=starts)
     assert found.not_finite == 6
@@ -109,7 +109,7 @@ def test_davenports_matrix_may_overflow(dtype):
 
 
 def test_a_family_of_the_callers_may_hold_anything():
-    family = families.Family("own", "with NaN and infinities", lambda draw: families.poison(draw.gaussian()))
+    family = families.Family("own", "with NaN and infinities", lambda draw: families.with_non_finite(draw.gaussian()))
     sample = family.sample(9, dtype=np.float64)
     is_finite = np.isfinite(sample.matrices).all(axis=(1, 2))
     assert is_finite.sum() == 6

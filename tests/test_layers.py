@@ -17,7 +17,7 @@ LAYERS = [
     {"_nearest", "_refine", "_svd"},
     {"_gap", "_jacobian", "_polar"},
     {"_isotropic"},
-    {"measuring"},
+    {"evaluation"},
     {"_recommend"},
     {"__init__"},
     {"console"},
@@ -87,4 +87,4 @@ def test_importing_jaxrot_loads_nothing_that_measures():
     program = "import sys, jaxrot; print([name for name in sys.modules if name.startswith('jaxrot.')])"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert "jaxrot._nearest" in run.stdout
-    assert not re.search(r"measuring|_recommend|report|scenes", run.stdout)
+    assert not re.search(r"evaluation|_recommend|report|scenes", run.stdout)

@@ -12,9 +12,9 @@ from jaxrot._recommend import recommend as recommend_module
 from jaxrot._recommend import sample as sample_module
 from jaxrot._recommend.candidates import outside_domain, start_outside_domain
 from jaxrot._recommend.sample import take_sample
+from jaxrot.evaluation import reference
+from jaxrot.evaluation.timing import Timing
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
-from jaxrot.measuring.timing import Timing
 
 # What the report measured; a step is as fast as so many ns for each of its iterations.
 NS = {"taylor": 15, "quaternion_average": 15, "higham_noferini": 36, DEFAULT_METHOD: 52, "squaring": 132}
@@ -281,7 +281,7 @@ def test_times_are_measured_on_this_machine(inverted, monkeypatch):
     monkeypatch.setattr(candidates, "TIMING_BUDGET_S", 0.1)
     monkeypatch.setattr(recommend_module, "METHODS", {DEFAULT_METHOD: METHODS[DEFAULT_METHOD]})
     with pytest.MonkeyPatch.context() as own:
-        own.setattr(candidates, "time_methods", jaxrot.measuring.timing.time_methods)
+        own.setattr(candidates, "time_methods", jaxrot.evaluation.timing.time_methods)
         result = recommend(inverted, tolerance=1e-2)
     low, high = result.time_quartiles_ns
     assert 0 < low <= result.time_ns <= high < 1e5

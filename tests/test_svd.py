@@ -7,7 +7,7 @@ from certificate import assert_rotations, assert_within, family_batch, survives_
 from differences import DISTINCT, POINTS, assert_is_derivative
 
 from jaxrot import nearest_rotation, rotation_variant_svd, signed_singular_values
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
 
 DTYPES = ["float32", "float64"]
 distinct = pytest.mark.parametrize("matrix", DISTINCT.values(), ids=DISTINCT.keys())

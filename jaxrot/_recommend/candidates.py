@@ -13,11 +13,11 @@ from jaxrot._inputs import check_matrix, check_start
 from jaxrot._nearest import nearest_rotation
 from jaxrot._recommend.sample import Sample
 from jaxrot._refine import refine_rotation
-from jaxrot.measuring import domain, reference
-from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
-from jaxrot.measuring.judging import Judged
-from jaxrot.measuring.timing import Compiled, compile_method, time_methods
-from jaxrot.measuring.words import number
+from jaxrot.evaluation import domain, reference
+from jaxrot.evaluation.accuracy import measure_errors, run_in_chunks
+from jaxrot.evaluation.formatting import number
+from jaxrot.evaluation.ground_truth import Judged
+from jaxrot.evaluation.timing import Compiled, compile_method, time_methods
 from jaxrot.solvers import Method
 
 # The largest κ for an approximation: s2 + s3 ≥ s1. Approximations are for matrices near a rotation, κ = 1/2.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax
 
 from jaxrot._recommend.candidates import Candidate
-from jaxrot.measuring.words import listed, number
+from jaxrot.evaluation.formatting import listed, number
 from jaxrot.solvers import DEFAULT_METHOD
 
 

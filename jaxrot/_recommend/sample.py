@@ -11,8 +11,8 @@ from jax import core
 from jax.typing import ArrayLike, DTypeLike
 
 from jaxrot._inputs import check_matrix, check_start, computing
-from jaxrot.measuring import domain
-from jaxrot.measuring.judging import Judged, judge
+from jaxrot.evaluation import domain
+from jaxrot.evaluation.ground_truth import Judged, judge
 
 # A larger sample would not change the result, and the reference takes 20 µs a matrix.
 MOST_MATRICES = 10_000

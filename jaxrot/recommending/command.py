@@ -18,7 +18,7 @@ from jaxrot.console.extras import check_installed
 from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.printing import show
 from jaxrot.console.progress import progress
-from jaxrot.measuring.words import number
+from jaxrot.evaluation.formatting import number
 from jaxrot.report.inputs import Input, read_input
 from jaxrot.report.writing.tables import Table, as_text
 

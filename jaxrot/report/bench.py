@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxrot
-from jaxrot.measuring.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
+from jaxrot.evaluation.timing import MOST_ROUNDS, SHORTEST_SAMPLE_S, compile_method, interleave
 from jaxrot.report.measurement import method_function
 
 

@@ -7,10 +7,10 @@ import jax
 import numpy as np
 
 import jaxrot
-from jaxrot.measuring import gradient_reference
-from jaxrot.measuring.accuracy import measure_errors, run_in_chunks
-from jaxrot.measuring.judging import Judged
-from jaxrot.measuring.timing import fill_batch, interleave
+from jaxrot.evaluation import gradient_reference
+from jaxrot.evaluation.accuracy import measure_errors, run_in_chunks
+from jaxrot.evaluation.ground_truth import Judged
+from jaxrot.evaluation.timing import fill_batch, interleave
 from jaxrot.report.contenders import Beside, Contender, Quantiles, quantiles, spread
 from jaxrot.report.measurement import method_function
 from jaxrot.report.peers import PEERS

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxrot.console.errors import UserError, shown
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.timing import Timing
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.measurement import WHOLE, Results
 
 # The median of fewer ratios is as good as the ratio of the method that is looked at.

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import jaxrot
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.timing import Timing
-from jaxrot.measuring.words import listed, number
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.formatting import listed, number
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.contenders import Beside, Contender, Spread, beyond_front
 from jaxrot.report.content import Content
 from jaxrot.report.measurement import WHOLE, Results

@@ -8,10 +8,10 @@ import jax
 import numpy as np
 
 import jaxrot
-from jaxrot.measuring import reference
-from jaxrot.measuring.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
-from jaxrot.measuring.judging import Judged
-from jaxrot.measuring.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
+from jaxrot.evaluation import reference
+from jaxrot.evaluation.accuracy import Accuracy, measure_errors, run_in_chunks, summarise
+from jaxrot.evaluation.ground_truth import Judged
+from jaxrot.evaluation.timing import FEWEST_ROUNDS, Compiled, Timing, compile_method, time_methods
 from jaxrot.report.guards.prices import Size as GuardsSize
 
 WHOLE = "whole input"

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import jaxrot
-from jaxrot.measuring.domain import largest_condition
-from jaxrot.measuring.timing import Timing
-from jaxrot.measuring.words import listed, number
+from jaxrot.evaluation.domain import largest_condition
+from jaxrot.evaluation.formatting import listed, number
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.drawing import pictures
 from jaxrot.report.findings import largest_batch
 from jaxrot.report.guards.prices import Time

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import jaxrot
-from jaxrot.measuring.judging import judge
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.report import beside, warm_starts
 from jaxrot.report.contenders import Beside
 from jaxrot.report.drawing.pareto import pareto_front

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxrot
-from jaxrot.measuring.accuracy import measure_errors
-from jaxrot.measuring.judging import Judged
-from jaxrot.measuring.timing import fill_batch, interleave
+from jaxrot.evaluation.accuracy import measure_errors
+from jaxrot.evaluation.ground_truth import Judged
+from jaxrot.evaluation.timing import fill_batch, interleave
 from jaxrot.report.contenders import Quantiles, Spread, quantiles, spread
 from jaxrot.report.peers import paper_code
 from jaxrot.report.peers.peer import UnavailableError

@@ -31,7 +31,7 @@ from jaxrot import (
     rotation_jacobian,
     rotation_variant_svd,
 )
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
 
 EPS = np.finfo(np.float32).eps
 BATCH = family_batch("float32", 6)

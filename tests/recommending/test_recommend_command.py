@@ -68,7 +68,7 @@ def test_previous_rotations_are_read_by_name(tmp_path, monkeypatch, capsys):
 
 
 def _steps_first(compiled, matrices, batch, **options):
-    timings = jaxrot.measuring.timing.time_methods(compiled, matrices, batch, **options)
+    timings = jaxrot.evaluation.timing.time_methods(compiled, matrices, batch, **options)
     return [
         entry._replace(median_ns=1, quartile_1_ns=1, quartile_3_ns=1) if "(" in entry.method else entry
         for entry in timings

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from jaxrot.measuring import gradient_reference, reference
-from jaxrot.measuring.judging import judge
+from jaxrot.evaluation import gradient_reference, reference
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.report import beside, peers
 from jaxrot.report.beside import measure_beside, number_of_steps
 from jaxrot.report.contenders import Contender

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.timing import Timing
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.content import Content
 from jaxrot.report.inputs import Input

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.timing import Timing
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.contenders import Beside, Contender, Quantiles, Spread, beyond_front
 from jaxrot.report.content import Content
 from jaxrot.report.findings import faster_outside, findings, largest_batch

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from jaxrot import STEPS, _refine, nearest_rotation
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.families import FAMILIES
-from jaxrot.measuring.judging import judge
 from jaxrot.report.guards import default_method
 from jaxrot.report.guards import prices as guards
 from jaxrot.report.guards import steps as step_guards
@@ -173,8 +173,8 @@ def test_a_step_that_does_nothing_keeps_the_nearest_start_and_one_that_turns_doe
 
 def test_results_that_are_no_rotations_are_judged_by_the_promise_they_break():
     finite = FAMILIES["gaussian"].sample(3, dtype=np.float64).matrices
-    poisoned = np.full((1, 3, 3), np.inf)
-    judged = judge({"finite": finite, NOT_FINITE: poisoned}, "float64")
+    changed = np.full((1, 3, 3), np.inf)
+    judged = judge({"finite": finite, NOT_FINITE: changed}, "float64")
     given = np.array(judged.solution.rotation, float)
     given[1] = np.nan
     given[2] *= 1.5

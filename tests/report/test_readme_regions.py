@@ -7,7 +7,7 @@ import re
 import pytest
 
 from jaxrot import DEFAULT_METHOD, METHODS
-from jaxrot.measuring.timing import Timing
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report import readme
 
 ROOT = pathlib.Path(__file__).parent.parent.parent

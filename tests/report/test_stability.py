@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot.measuring import reference
-from jaxrot.measuring.accuracy import run_in_chunks
+from jaxrot.evaluation import reference
+from jaxrot.evaluation.accuracy import run_in_chunks
 from jaxrot.report.stability.cells import Kind, map_conditions, map_scales, summarise_conditions, summarise_scales
 
 DTYPES = ("float32", "float64")

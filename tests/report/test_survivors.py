@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 import jaxrot
+from jaxrot.evaluation.accuracy import Accuracy
 from jaxrot.families import FAMILIES
-from jaxrot.measuring.accuracy import Accuracy
 from jaxrot.report.drawing import figures
 from jaxrot.report.stability.survivors import CASES, Grade, draw_survival, grade, survivors_table
 

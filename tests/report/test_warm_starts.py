@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot.measuring import reference
-from jaxrot.measuring.judging import judge
+from jaxrot.evaluation import reference
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.report import warm_starts
 from jaxrot.report.peers import paper_code
 from jaxrot.report.peers.peer import UnavailableError

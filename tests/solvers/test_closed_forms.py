@@ -6,8 +6,8 @@ import pytest
 
 from jaxrot import nearest_rotation
 from jaxrot._algebra import mat3, quaternion
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 from jaxrot.solvers import horn_quartic, smith_franca
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from jaxrot import nearest_rotation
 from jaxrot._nearest import solved
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 from jaxrot.solvers import gram_schmidt
 
 ORDERS = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from jaxrot import nearest_rotation
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 
 solve = functools.partial(nearest_rotation, method="irving")
 

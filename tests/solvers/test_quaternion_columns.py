@@ -3,8 +3,8 @@
 import numpy as np
 
 from jaxrot import nearest_rotation
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 
 
 def test_the_average_is_best_in_the_worst_case_and_shepperd_and_markley_worst_in_the_mean():

@@ -7,8 +7,8 @@ import pytest
 
 from jaxrot._algebra import mat3
 from jaxrot._algebra.scaling import safe_divide, scaled
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES
-from jaxrot.measuring import reference
 from jaxrot.solvers import implicit_qr_svd, jacobi_svd
 
 MODULES = pytest.mark.parametrize("module", [jacobi_svd, implicit_qr_svd], ids=["jacobi_svd", "implicit_qr_svd"])

@@ -10,8 +10,8 @@ import pytest
 from jaxrot import refine_quaternion_wxyz, refine_rotation
 from jaxrot._algebra import mat3, quaternion
 from jaxrot._algebra.scaling import scaled
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES, half_turn_starts
-from jaxrot.measuring import reference
 from jaxrot.steps.escape import leave_equilibrium
 
 escaped = jax.jit(functools.partial(refine_rotation, iterations=0, escape=True))

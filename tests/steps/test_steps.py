@@ -11,8 +11,8 @@ from certificate import assert_rotations
 
 from jaxrot import STEPS, refine_rotation
 from jaxrot._algebra import mat3, quaternion
+from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES, half_turn_starts
-from jaxrot.measuring import reference
 from jaxrot.steps.exact_angle import turn_about
 
 EXACT_ANGLE = ["torque_exact_angle", "newton"]

@@ -11,8 +11,8 @@ from jax.stages import Compiled, Lowered
 
 import jaxrot
 from jaxrot import STEPS
-from jaxrot.measuring.judging import judge
-from jaxrot.measuring.timing import interleave
+from jaxrot.evaluation.ground_truth import judge
+from jaxrot.evaluation.timing import interleave
 from jaxrot.report.guards import default_method
 from jaxrot.report.guards import steps as step_guards
 from jaxrot.report.guards.starts import HALF_TURN, ITERATIONS, Posed, judge_step, pose

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxrot._algebra import mat3, quaternion
+from jaxrot.evaluation import domain
+from jaxrot.evaluation.ground_truth import Judged, judge
 from jaxrot.families import half_turn_starts
-from jaxrot.measuring import domain
-from jaxrot.measuring.judging import Judged, judge
 from jaxrot.report.guards.verdict import Verdict, judge_contract
 
 # A warm start 45° off, one 135° off, one at the nearest rotation, and one exactly half a turn off, which stands still.

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from jaxrot.measuring.words import number
+from jaxrot.evaluation.formatting import number
 from jaxrot.report.guards.prices import Price, Time
 from jaxrot.report.guards.verdict import Broken
 from jaxrot.report.writing.tables import Table

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxrot.families import FAMILIES, poison
-from jaxrot.measuring.accuracy import measure_errors
-from jaxrot.measuring.judging import Judged
+from jaxrot.evaluation.accuracy import measure_errors
+from jaxrot.evaluation.ground_truth import Judged
+from jaxrot.families import FAMILIES, with_non_finite
 from jaxrot.report.inputs import family_matrices
 
 # A set of its own beside `FAMILIES`; the promise there is NaN, and nothing but NaN.
@@ -57,9 +57,9 @@ class Broken(NamedTuple):
 
 def sample_families(count: int, dtype: str) -> dict[str, np.ndarray]:
     """`count` matrices of every family, and matrices that are not finite."""
-    # Every third is poisoned.
+    # Every third is changed.
     return family_matrices(count, dtype) | {
-        NOT_FINITE: poison(FAMILIES["gaussian"].sample(3 * count, dtype=np.dtype(dtype)).matrices)[::3]
+        NOT_FINITE: with_non_finite(FAMILIES["gaussian"].sample(3 * count, dtype=np.dtype(dtype)).matrices)[::3]
     }
 
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxrot.evaluation.accuracy import Errors, measure_errors
+from jaxrot.evaluation.ground_truth import judge
 from jaxrot.families import Family
-from jaxrot.measuring.accuracy import Errors, measure_errors
-from jaxrot.measuring.judging import judge
 
 Run = Callable[[str, np.ndarray], np.ndarray]
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 import jaxrot
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.formatting import listed
 from jaxrot.families import FAMILIES
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.words import listed
 from jaxrot.report.drawing.figures import KEPT, NOT_A_ROTATION, NOT_FINITE, as_png, new_figure, patches
 from jaxrot.report.stability.cells import ROTATION_TOLERANCE
 from jaxrot.report.writing.tables import Table

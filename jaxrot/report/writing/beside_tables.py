@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from jaxrot.measuring.words import number
+from jaxrot.evaluation.formatting import number
 from jaxrot.report.comparison import Comparison
 from jaxrot.report.contenders import Contender, Quantiles, Spread, beyond_front
 from jaxrot.report.warm_starts import WarmStart

@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.timing import Timing
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.bench import Bench
 from jaxrot.report.content import Content
 from jaxrot.report.findings import findings

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import jaxrot
-from jaxrot.measuring.accuracy import Accuracy
-from jaxrot.measuring.domain import describe_domain
-from jaxrot.measuring.timing import Timing
-from jaxrot.measuring.words import number
+from jaxrot.evaluation.accuracy import Accuracy
+from jaxrot.evaluation.domain import describe_domain
+from jaxrot.evaluation.formatting import number
+from jaxrot.evaluation.timing import Timing
 from jaxrot.report.bench import Goal
 from jaxrot.report.findings import on_input, times_at_largest_batch
 from jaxrot.report.measurement import WHOLE, Results

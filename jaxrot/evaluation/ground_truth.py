@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxrot.measuring import reference
+from jaxrot.evaluation import reference
 
 
 class Judged(NamedTuple):

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jaxrot.measuring.reference import Reference, solve
+from jaxrot.evaluation.reference import Reference, solve
 
 
 def pullback(matrices: ArrayLike, rotation_bar: ArrayLike, *, reference: Reference | None = None) -> NDArray:

@@ -1,6 +1,6 @@
 import numpy as np
 
-from jaxrot.measuring import gradient_reference, reference
+from jaxrot.evaluation import gradient_reference, reference
 
 
 def test_it_is_the_slope_of_the_rotation():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxrot.measuring.judging import Judged
+from jaxrot.evaluation.ground_truth import Judged
 from jaxrot.solvers import Method
 
 # Bounds in units of eps; the forward error's is per (1 + κ), the last two are relative to s1.

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 import jaxrot
-from jaxrot.measuring import accuracy
-from jaxrot.measuring.domain import describe_domain, in_domain
-from jaxrot.measuring.judging import judge
+from jaxrot.evaluation import accuracy
+from jaxrot.evaluation.domain import describe_domain, in_domain
+from jaxrot.evaluation.ground_truth import judge
 
 EPS = np.finfo(np.float32).eps
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxrot.measuring import domain, reference
-from jaxrot.measuring.judging import Judged
+from jaxrot.evaluation import domain, reference
+from jaxrot.evaluation.ground_truth import Judged
 from jaxrot.solvers import Method
 
 

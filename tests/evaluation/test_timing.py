@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from jaxrot.measuring import timing
+from jaxrot.evaluation import timing
 
 
 class Clock:
