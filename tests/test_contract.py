@@ -13,7 +13,7 @@ from hypothesis import strategies
 
 from jaxrot import nearest_rotation
 from jaxrot.evaluation import reference
-from jaxrot.report.guards import default_method
+from jaxrot.report.measure import ablated_method
 
 DTYPES = ["float32", "float64"]
 BITS = {"float32": np.uint32, "float64": np.uint64}
@@ -108,7 +108,7 @@ def test_climbing_by_units_in_the_last_place_does_not_break_the_contract(dtype):
         current = neighbours.reshape(16, *current.shape)[worst, np.arange(len(current))]
 
 
-@pytest.mark.parametrize("guard", [name for name in default_method.GUARDS if name != "rotations as they are"])
+@pytest.mark.parametrize("guard", [name for name in ablated_method.GUARDS if name != "rotations as they are"])
 def test_every_stage_is_needed(guard):
     """Without it the contract breaks, on a family that it is there for."""
     batch = family_batch("float64")
@@ -118,7 +118,7 @@ def test_every_stage_is_needed(guard):
         "nearer reflection": ["signed_permutation", "planar_motion"],
         "renormalisation": ["drifted_rotation"],
     }[guard]
-    rotation = np.asarray(jax.jit(functools.partial(default_method.solve, without=guard))(batch.matrices))
+    rotation = np.asarray(jax.jit(functools.partial(ablated_method.solve, without=guard))(batch.matrices))
     where = in_families(batch, families)
     part = Batch(*(entry[where] for entry in batch))
     with pytest.raises(AssertionError):
@@ -139,7 +139,7 @@ def test_a_rotation_comes_back_as_it_is(dtype):
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-@pytest.mark.parametrize("run", [default_method.solve, nearest], ids=["operations", "program"])
+@pytest.mark.parametrize("run", [ablated_method.solve, nearest], ids=["operations", "program"])
 def test_simple_matrices_have_exact_rotations(run, dtype):
     def solved(matrix):
         return np.asarray(run(np.asarray(matrix, dtype)))

@@ -196,7 +196,7 @@ def test_half_turn_starts_have_no_torque_and_their_neighbours_a_little(dtype):
     assert torque[3:].min() > eps
 
 
-def test_poison_leaves_the_neighbours_alone():
+def test_with_non_finite_leaves_the_neighbours_alone():
     matrices = FAMILIES["gaussian"].sample(10).matrices
     before = matrices.copy()
     changed = with_non_finite(matrices)

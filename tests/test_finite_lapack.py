@@ -11,8 +11,8 @@ from jaxrot.__main__ import main
 from jaxrot._recommend import candidates
 from jaxrot._recommend import recommend as recommend_module
 from jaxrot.evaluation.ground_truth import judge
-from jaxrot.report import beside
 from jaxrot.report.inputs import read_input
+from jaxrot.report.measure import peer_comparison
 from jaxrot.report.peers import PEERS, jax_linalg
 from jaxrot.scenes import body, drop, tetrahedra, tetrahedron
 
@@ -80,18 +80,18 @@ def test_recommend_leaves_out_what_overflows(one_method, tmp_path, capsys):
 
 def test_peers_get_nothing_that_is_not_finite(tmp_path, monkeypatch):
     names = ("jnp.linalg.svd", "jnp.linalg.eigh", "SciPy from_matrix", "SciPy align_vectors")
-    monkeypatch.setattr(beside, "PEERS", {name: PEERS[name] for name in names})
+    monkeypatch.setattr(peer_comparison, "PEERS", {name: PEERS[name] for name in names})
     monkeypatch.setattr(
-        beside, "interleave", lambda calls, **options: ({name: [call()] for name, call in calls.items()}, {})
+        peer_comparison, "interleave", lambda calls, **options: ({name: [call()] for name, call in calls.items()}, {})
     )
-    monkeypatch.setattr(beside, "spread", lambda seconds, batch: None)
+    monkeypatch.setattr(peer_comparison, "spread", lambda seconds, batch: None)
     np.save(tmp_path / "own.npy", NOT_FINITE)
     huge = families.FAMILIES["scale_huge"].sample(8).matrices
     judged = {
         "input": judge(read_input(tmp_path / "own.npy").sets, "float32"),
         "families": judge({"scale_huge": huge}, "float32"),
     }
-    found = beside.measure_beside([], judged, batch=8, budget_s=0.0, advance=lambda step: None)
+    found = peer_comparison.compare_with_peers([], judged, batch=8, budget_s=0.0)
     assert [entry.name for entry in found.contenders if not entry.is_own] == list(names)
     assert {entry.name for entry in found.contenders if entry.families_no_number} >= {"jnp.linalg.eigh"}
 

@@ -63,7 +63,7 @@ def recommend_step_by_step(
     dtype: DTypeLike | None,
     advance: Callable[[str], object],
 ) -> Recommendation:
-    """`recommend` with progress: calls `advance` with the name of each step before it starts, see `number_of_steps`."""
+    """`recommend` with progress: calls `advance` with the name of each step before it starts."""
     tolerance = _check_tolerance(tolerance)
     advance("the reference")
     sample = take_sample(matrices, previous, dtype)
@@ -100,11 +100,6 @@ def recommend_step_by_step(
         too_inaccurate=tuple(errors),
         excluded=FrozenMapping(excluded),
     )
-
-
-def number_of_steps(*, has_previous: bool) -> int:
-    """The largest number of times that `recommend_step_by_step` calls `advance`."""
-    return 2 + len(METHODS) + has_previous * len(STEPS)
 
 
 def _measure_all(

@@ -1,1 +1,1 @@
-"""What the commands share: their arguments, their errors, Ctrl-C, what they print and write, the progress bar."""
+"""What the commands share: arguments, errors, Ctrl-C, output, tables, the progress display."""

@@ -9,7 +9,7 @@ from jaxrot.console.printing import complain, show
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, without the usage in front of them."""
+    """A parser whose error messages are one line, without the usage."""
 
     def error(self, message: str) -> NoReturn:
         """Ends the process with status 2 and one line."""
@@ -26,7 +26,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def path(word: str) -> Path:
-    """A file or a folder; an empty word, such as a shell variable that is not set, would be the current folder.
+    """A file or a folder. An empty word, such as a shell variable that is not set, would be the current folder.
 
     Raises:
         argparse.ArgumentTypeError: The word is empty.

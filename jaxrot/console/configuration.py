@@ -8,7 +8,7 @@ import jax
 
 @contextmanager
 def measuring_configuration() -> Iterator[None]:
-    """float64 allowed, and no compilation cache: a hit would pass for a short compile time."""
+    """Allows float64, and disables the compilation cache, which would shorten the measured compile times."""
     wanted = {"jax_enable_x64": True, "jax_enable_compilation_cache": False}
     before = {name: getattr(jax.config, name) for name in wanted}
     try:

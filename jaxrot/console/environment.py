@@ -1,4 +1,4 @@
-"""The header of a report: everything a reader needs to repeat or to doubt its numbers."""
+"""The header of a report: the machine, the versions and the settings behind its numbers."""
 
 import datetime
 import os
@@ -14,7 +14,7 @@ import jaxrot
 
 
 def describe_environment(dtypes: tuple[str, ...]) -> dict[str, str]:
-    """The header's lines, name and value, in the order to print them."""
+    """The lines of the header, values by name, in order."""
     device = jax.devices()[0]
     return {
         "jaxrot": f"{jaxrot.__version__}, commit {commit()}",
@@ -30,10 +30,9 @@ def describe_environment(dtypes: tuple[str, ...]) -> dict[str, str]:
 
 
 def commit() -> str:
-    """The short hash of the checkout that jaxrot was imported from, `+` behind it where files differ.
+    """The short hash of the checkout that jaxrot was imported from, with a `+` if files differ.
 
-    An installed copy may lie in a virtual environment inside somebody else's checkout; that commit is not ours. So git
-    must say that it tracks this very file.
+    git must track this file, because an installed copy may lie inside a checkout of another project.
     """
     here = Path(__file__)
     if _git("ls-files", "--error-unmatch", here.name, folder=here.parent) is None:
@@ -54,7 +53,7 @@ def _git(*arguments: str, folder: Path) -> str | None:
 
 
 def processor() -> str:
-    """The processor's name, as far as the operating system tells."""
+    """The processor's name, if the operating system tells it."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith("model name"):
@@ -65,10 +64,10 @@ def processor() -> str:
 
 
 def usable_cores() -> int:
-    """Cores this process may run on; containers and `taskset` make it fewer than the machine has."""
+    """The cores that this process may use: fewer than the machine has under `taskset` or in a container."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def load_average() -> str:
-    """The one-minute load average: well above 0, others were computing and the timings are theirs too."""
+    """The one-minute load average. If it is well above 0, other processes disturbed the timings."""
     return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"

@@ -1,8 +1,8 @@
-"""The exceptions of the commands, and how names of the user's are shown in them."""
+"""The exceptions of the commands, and names in their messages."""
 
 
 class UserError(Exception):
-    """Something that the user can fix: what is wrong and what was expected, always in one line."""
+    """A mistake that the user can fix: what is wrong and what was expected, in one line."""
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
@@ -13,7 +13,7 @@ class UnreadError(Exception):
 
 
 def shown(name: object) -> str:
-    """A name for a message: as it is if it can be read in one line, quoted and with escapes if not."""
+    """A name for a message, quoted and with escapes if it is empty or does not print in one line."""
     word = str(name)
     return word if word and word.isprintable() else repr(word)
 

@@ -1,4 +1,4 @@
-"""Packages that only a command needs: asked for before anything is computed."""
+"""The check for packages that only a command needs."""
 
 import importlib.util
 from collections.abc import Sequence
@@ -8,17 +8,12 @@ from jaxrot.console.printing import is_watched
 
 
 def check_installed(needed: Sequence[str], extra: str) -> None:
-    """Refuses to begin without the packages; tqdm, the progress bar, is needed where somebody is looking.
-
-    Args:
-        needed: Names of packages.
-        extra: The extra of jaxrot that brings them.
+    """Checks for the packages that an extra of jaxrot brings, and for tqdm if standard error is a terminal.
 
     Raises:
-        UserError: One is not installed.
+        UserError: A package is not installed.
     """
     needed = [*needed, *(["tqdm"] if is_watched() else [])]
     missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
-        verb = "is" if len(missing) == 1 else "are"
-        raise UserError(f"{' and '.join(missing)} {verb} not installed; expected: pip install 'jaxrot[{extra}]'")
+        raise UserError(f"not installed: {', '.join(missing)}; expected: pip install 'jaxrot[{extra}]'")

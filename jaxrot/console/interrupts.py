@@ -1,4 +1,4 @@
-"""Ctrl-C during a command: one line where nothing is finished, and no result lost where something is."""
+"""Ctrl-C during a command: one line before there are results, and no result lost after that."""
 
 import math
 import signal
@@ -19,10 +19,10 @@ _REPEAT_S = 0.05
 
 
 class Interrupts:
-    """What Ctrl-C does: it raises KeyboardInterrupt until `hold`, and is only noted from then on.
+    """The effect of Ctrl-C: it raises KeyboardInterrupt until `hold`, and is only noted from then on.
 
     Attributes:
-        pending: Ctrl-C was pressed, and has had no effect yet.
+        pending: Ctrl-C was pressed and has had no effect yet.
         has_results: The command has results to lose.
         handled_at: When Python last saw a Ctrl-C, on the monotonic clock.
     """
@@ -41,12 +41,12 @@ class Interrupts:
             raise KeyboardInterrupt
 
     def repeat(self) -> None:
-        """Raises again, from any thread into the main one, what was raised in vain."""
+        """Raises again in the main thread, from any thread, if the first exception was lost."""
         if self.pending and self._is_raising:
             signal.raise_signal(signal.SIGINT)
 
     def hold(self) -> None:
-        """From now on there are results to lose: a Ctrl-C is noted, and the command asks for it where it can stop."""
+        """From now on a Ctrl-C is only noted, because there are results to lose. The command calls `check` to stop."""
         self.has_results, self._is_raising = True, False
 
     def check(self) -> None:
@@ -61,13 +61,13 @@ class Interrupts:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """For work that takes long and may be lost: here Ctrl-C raises KeyboardInterrupt at once, held or not."""
+        """Inside, Ctrl-C raises KeyboardInterrupt at once, for long work whose result may be lost."""
         before, self._is_raising = self._is_raising, True
         try:
             self.check()
             yield
         except BaseException:
-            # Code that cleans up after a KeyboardInterrupt may raise an error of its own in its place.
+            # Code that cleans up after a KeyboardInterrupt may raise an error of its own instead.
             if self.pending:
                 raise KeyboardInterrupt from None
             raise
@@ -77,10 +77,10 @@ class Interrupts:
 
 @contextmanager
 def watched(*, owns_process: bool = False) -> Iterator[Interrupts]:
-    """Handles Ctrl-C for one command, where the process lets it: in the main thread, and not as a background job.
+    """Handles Ctrl-C for one command, in the main thread and unless the process is a background job.
 
     Args:
-        owns_process: The process runs nothing but the command, and may be ended where Python does not see the Ctrl-C.
+        owns_process: The process runs only the command. It is ended if a Ctrl-C does not reach Python.
     """
     interrupts = Interrupts()
     before = signal.getsignal(signal.SIGINT)
@@ -90,8 +90,8 @@ def watched(*, owns_process: bool = False) -> Iterator[Interrupts]:
     report_unraisable = sys.unraisablehook
 
     def hook(unraisable: Any) -> None:
-        # Python cannot raise in a finalizer or in a callback of the garbage collector, such as JAX has one. It would
-        # print a traceback and go on.
+        # Python cannot raise in a finalizer or in a callback of the garbage collector, such as that of JAX. It would
+        # print a traceback and continue.
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             threading.Timer(_REPEAT_S, interrupts.repeat).start()
         else:
@@ -109,7 +109,7 @@ def watched(*, owns_process: bool = False) -> Iterator[Interrupts]:
 
 @contextmanager
 def _ending_if_stuck(interrupts: Interrupts) -> Iterator[None]:
-    """Ends the process if there is nothing to save and a Ctrl-C does not get through to Python."""
+    """Ends the process if there is no result to save and a Ctrl-C does not reach Python."""
     reader, writer = socket.socketpair()
 
     def watch() -> None:

@@ -1,4 +1,4 @@
-"""The folder of a command's results: tried before anything is computed, filled only when everything is there."""
+"""The folder of a command's results: checked before anything is computed, written when all results are there."""
 
 import os
 import shutil
@@ -10,9 +10,7 @@ from jaxrot.console.errors import UserError, shown
 
 
 def check_writable(folder: Path) -> None:
-    """Refuses a folder that could not be written to at the end, and leaves no trace of the attempt.
-
-    Permission bits do not tell (an administrator, a read-only file system), so it tries.
+    """Checks that the folder can be written to, by trying: permission bits say nothing about a read-only file system.
 
     Raises:
         UserError: The path is a file, leads through one, or cannot be written to.
@@ -25,17 +23,16 @@ def check_writable(folder: Path) -> None:
             raise UserError(
                 f"--out {shown(folder)}: {shown(nearest)} is a file; expected a folder, or a name for a new one"
             )
-        # A file without a name where the system has such: nothing is left behind, whenever Ctrl-C is pressed.
+        # Most systems give this file no name, so that nothing is left behind after a Ctrl-C.
         tempfile.TemporaryFile(prefix=".jaxrot-", dir=nearest).close()
     except OSError as error:
         raise _cannot_write(folder, error) from None
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Writes all files or none.
+    """Writes all files or none. Other files in an existing folder stay.
 
-    They are written to a temporary folder on the same file system first: what is left to fail in the end are renames.
-    Other files in an existing folder stay.
+    The files go to a temporary folder on the same file system first, so that only renames can fail after that.
 
     Raises:
         UserError: Something cannot be written.

@@ -10,15 +10,11 @@ from jaxrot.console.errors import UnreadError, UserError, shown
 
 
 def show(text: str, folder: Path | None = None) -> None:
-    """Prints to standard output, and makes sure that it arrives.
-
-    Args:
-        text: What to print.
-        folder: Where the command has written its results already, for the message.
+    """Prints to standard output, and checks that the text arrives. An error message names the folder of the results.
 
     Raises:
         UserError: Standard output is closed, or cannot be written to, as on a full disk.
-        UnreadError: It is a pipe, and its reader has gone.
+        UnreadError: Standard output is a pipe, and its reader has gone.
     """
     results = "" if folder is None else f"; the results are in {shown(folder)}"
     if sys.stdout is None:
@@ -35,7 +31,7 @@ def show(text: str, folder: Path | None = None) -> None:
 
 
 def complain(text: str) -> None:
-    """Prints to standard error, if that is there: the exit status says enough."""
+    """Prints to standard error. If that is not possible, only the exit status reports the error."""
     if sys.stderr is None:
         return  # print would take standard output instead
     try:
@@ -45,12 +41,12 @@ def complain(text: str) -> None:
 
 
 def is_watched() -> bool:
-    """Whether somebody looks at standard error."""
+    """Whether standard error is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def _discard(stream: TextIO) -> None:
-    """Sends what is left in the buffer nowhere: Python would try again at exit, and print a traceback."""
+    """Discards the buffer. Python would try to write it again at exit, and print a traceback."""
     with contextlib.suppress(OSError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

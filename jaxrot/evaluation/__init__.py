@@ -1,4 +1,1 @@
-"""Error and time of a rotation: judged against a wider arithmetic, timed side by side.
-
-The tests, `recommend` and the report share it; no result of the library depends on it.
-"""
+"""Errors of rotations relative to wider arithmetic, and times in interleaved rounds, for reports and tests."""

@@ -1,4 +1,4 @@
-"""How right a method's rotations are, judged against a wider arithmetic."""
+"""Errors of a method's rotations, relative to a reference in wider arithmetic."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -11,54 +11,37 @@ from jaxrot.solvers import Method
 
 
 class Accuracy(NamedTuple):
-    """How one method did on one set of matrices in one dtype.
+    """Errors of one method on one set of matrices in one dtype.
 
-    Errors are None where the set holds no matrix they are defined on: the forward error is judged where
-    κ < 1/(8 eps), the others on every finite matrix, and none but orthogonality where subnormal entries carry R.
-
-    Attributes:
-        method: The method's name.
-        dtype: "float32" or "float64".
-        group: "input" or "families".
-        set_name: The set's name within the group; "whole input" for all of it.
-        matrices: Matrices in the set.
-        not_finite: Of these, matrices with a NaN or an infinity: left out of every error.
-        judged: Of these, matrices whose forward error is judged.
-        forward_median: Median of ‖R - R*‖_F.
-        forward_99th: Its 99th percentile.
-        forward_max: Its maximum.
-        forward_units_median: Median of ‖R - R*‖_F / (eps (1 + κ)).
-        forward_units_max: Its maximum.
-        orthogonality_max: Largest ‖RᵀR - 1‖_F / eps; infinite where det R < 0.
-        lost_trace_max: Largest (tr(R*ᵀA) - tr(RᵀA)) / (eps s1).
-        torque_max: Largest ‖RᵀA - AᵀR‖_F / (eps s1).
-        outside: Matrices on which the contract is broken.
-        in_domain: Matrices on which the method declares that it keeps the contract.
-        outside_in_domain: Of these, matrices on which it does not.
+    An error is None if no matrix of the set defines it. The forward error is defined where κ < 1/(8 eps), and
+    the others on every finite matrix. If R depends on subnormal entries, only the orthogonality is defined.
     """
 
-    method: str
-    dtype: str
-    group: str
-    set_name: str
-    matrices: int
-    not_finite: int
-    judged: int
-    forward_median: float | None
-    forward_99th: float | None
-    forward_max: float | None
-    forward_units_median: float | None
-    forward_units_max: float | None
-    orthogonality_max: float | None
-    lost_trace_max: float | None
-    torque_max: float | None
-    outside: int
-    in_domain: int
-    outside_in_domain: int
+    method: str  # Its name
+    dtype: str  # "float32" or "float64"
+    group: str  # "input" or "families"
+    set_name: str  # The set's name within the group; "whole input" for all of it
+    matrices: int  # Matrices in the set
+    not_finite: int  # Of these, matrices with a NaN or an infinity, which are left out of every error
+    judged: int  # Of these, matrices whose forward error is judged
+    forward_median: float | None  # Median of ‖R - R*‖_F
+    forward_99th: float | None  # Its 99th percentile
+    forward_max: float | None  # Its maximum
+    forward_units_median: float | None  # Median of ‖R - R*‖_F / (eps (1 + κ))
+    forward_units_max: float | None  # Its maximum
+    orthogonality_max: float | None  # Largest ‖RᵀR - 1‖_F / eps; infinite if det R < 0
+    lost_trace_max: float | None  # Largest (tr(R*ᵀA) - tr(RᵀA)) / (eps s1)
+    torque_max: float | None  # Largest ‖RᵀA - AᵀR‖_F / (eps s1)
+    outside: int  # Matrices on which the contract is broken
+    in_domain: int  # Matrices on which the method declares that it keeps the contract
+    outside_in_domain: int  # Of these, matrices on which it does not
+
+
+_MAXIMA = ("forward", "forward_units", "orthogonality", "lost_trace", "torque")
 
 
 class Errors(NamedTuple):
-    """The errors of one method's rotations, one entry a matrix; NaN where not defined, inf where R is no number."""
+    """The errors of one method's rotations, one entry for each matrix: NaN if not defined, inf if R is not finite."""
 
     forward: np.ndarray
     forward_units: np.ndarray
@@ -79,13 +62,9 @@ class Errors(NamedTuple):
 
 
 def run_in_chunks(call: Callable[..., np.ndarray], matrices: np.ndarray, chunk: int, *starts: np.ndarray) -> np.ndarray:
-    """Applies a function compiled for one batch size to any number of matrices; the last chunk is filled up.
+    """Applies a function compiled for `chunk` matrices to any number of matrices, and to starts if it takes them.
 
-    Args:
-        call: Of as many arrays (chunk, 3, 3) as are given.
-        matrices: Shape (n, 3, 3), n > 0.
-        chunk: Matrices in a call.
-        *starts: Further arrays of the same shape.
+    The last chunk is filled up with its first matrix.
     """
     results = []
     for begin in range(0, len(matrices), chunk):
@@ -100,32 +79,27 @@ def measure_errors(rotation: np.ndarray, judged: Judged) -> Errors:
     """Every error of the rotations of `judged.matrices`."""
     matrices, solution = judged.matrices, judged.solution
     eps = float(np.finfo(matrices.dtype).eps)
-    is_number = np.isfinite(rotation).all(axis=(1, 2))
+    is_finite = np.isfinite(rotation).all(axis=(1, 2))
     is_scored = judged.is_finite & judged.is_normal
     is_unique = is_scored & (judged.condition < domain.largest_condition(matrices.dtype.name))
 
     def errors(values: np.ndarray, where: np.ndarray) -> np.ndarray:
-        # A rotation that is no number is infinitely wrong.
-        return np.where(where, np.where(is_number, values, np.inf), np.nan)
+        # The error of a rotation that is not finite is infinite.
+        return np.where(where, np.where(is_finite, values, np.inf), np.nan)
 
     forward = errors(reference.forward_error(rotation, matrices, reference=solution), is_unique)
     forward_units = forward / (eps * (1 + np.where(is_unique, judged.condition, 0)))
     orthogonality = errors(reference.orthogonality_error(rotation) / eps, judged.is_finite)
     lost_trace = errors(reference.lost_trace(rotation, matrices, reference=solution) / eps, is_scored)
     torque = errors(reference.torque(rotation, matrices, reference=solution) / eps, is_scored)
-    is_outside = (
-        (forward_units > domain.FORWARD_BOUND)
-        | (orthogonality > domain.ORTHOGONALITY_BOUND)
-        | (lost_trace > domain.LOST_TRACE_BOUND)
-        | (torque > domain.TORQUE_BOUND)
-        # The promise for a matrix that is not finite: NaN, and nothing but NaN.
-        | (~judged.is_finite & ~np.isnan(rotation).all(axis=(1, 2)))
-    )
-    return Errors(forward, forward_units, orthogonality, lost_trace, torque, is_outside)
+    # The promise for a matrix that is not finite is NaN in every entry.
+    is_outside = ~judged.is_finite & ~np.isnan(rotation).all(axis=(1, 2))
+    found = Errors(forward, forward_units, orthogonality, lost_trace, torque, is_outside)
+    return found._replace(is_outside=is_outside | (np.array(list(found.over_bounds.values())) > 1).any(axis=0))
 
 
 def summarise(name: str, method: Method, errors: Errors, judged: Judged, group: str) -> Iterator[Accuracy]:
-    """One `Accuracy` a set of the batch."""
+    """One `Accuracy` for each set of the batch."""
     inside = domain.in_domain(method, judged)
     for set_name, part in judged.sets.items():
         yield Accuracy(
@@ -138,12 +112,8 @@ def summarise(name: str, method: Method, errors: Errors, judged: Judged, group: 
             judged=int(np.sum(~np.isnan(errors.forward[part]))),
             forward_median=_statistic(np.median, errors.forward[part]),
             forward_99th=_statistic(_99th_percentile, errors.forward[part]),
-            forward_max=_statistic(np.max, errors.forward[part]),
             forward_units_median=_statistic(np.median, errors.forward_units[part]),
-            forward_units_max=_statistic(np.max, errors.forward_units[part]),
-            orthogonality_max=_statistic(np.max, errors.orthogonality[part]),
-            lost_trace_max=_statistic(np.max, errors.lost_trace[part]),
-            torque_max=_statistic(np.max, errors.torque[part]),
+            **{f"{name}_max": _statistic(np.max, getattr(errors, name)[part]) for name in _MAXIMA},
             outside=int(np.sum(errors.is_outside[part])),
             in_domain=int(np.sum(inside[part])),
             outside_in_domain=int(np.sum(errors.is_outside[part] & inside[part])),
@@ -151,7 +121,7 @@ def summarise(name: str, method: Method, errors: Errors, judged: Judged, group: 
 
 
 def _99th_percentile(values: np.ndarray) -> float:
-    # "higher" interpolates nothing: between a number and an infinity there is no number.
+    # "higher" does not interpolate: between a finite number and infinity the result would be NaN.
     return np.quantile(values, 0.99, method="higher")
 
 

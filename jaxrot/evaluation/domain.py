@@ -1,4 +1,4 @@
-"""The contract of the default method, in numbers, and the part of it that each method declares its own."""
+"""The bounds of the contract, and the domain on which each method declares that it keeps it."""
 
 import numpy as np
 
@@ -13,18 +13,10 @@ TORQUE_BOUND = 128
 
 
 def in_domain(method: Method, judged: Judged) -> np.ndarray:
-    """Which matrices a method declares it keeps the contract on.
-
-    Args:
-        method: A record of `jaxrot.METHODS`.
-        judged: The matrices, with their condition number and what else a domain speaks of.
-
-    Returns:
-        One boolean a matrix. All false for a method that promises nothing in units of eps.
-    """
+    """Whether each matrix lies in the domain on which the method declares that it keeps the contract."""
     dtype = judged.matrices.dtype.name
     limit = method.condition_limit[dtype]
-    # At a limit this high nothing is left out, matrices without a unique R and those with a NaN included.
+    # A limit this high includes matrices with a NaN or without a unique R.
     inside = np.full(len(judged.matrices), limit >= largest_condition(dtype)) | (judged.condition <= limit)
     if not method.handles_inversion:
         inside = inside & (~judged.is_inverted)
@@ -32,12 +24,12 @@ def in_domain(method: Method, judged: Judged) -> np.ndarray:
 
 
 def largest_condition(dtype: str) -> float:
-    """κ from which on the contract does not speak of the forward error."""
+    """The condition number from which on the contract does not bound the forward error."""
     return 1 / (8 * float(np.finfo(dtype).eps))
 
 
 def describe_domain(method: Method, dtype: str) -> str:
-    """The declared domain in a few words, for a table's column."""
+    """The declared domain as a short text for a table."""
     limit = method.condition_limit[dtype]
     words = ["exact" if method.exact else "approximation"]
     if not method.handles_inversion:

@@ -1,10 +1,10 @@
-"""Numbers and lists as words."""
+"""Numbers and lists as text."""
 
 from collections.abc import Sequence
 
 
 def number(value: float | None) -> str:
-    """Three digits at most; a dash where there is nothing to say."""
+    """A number with at most three digits; a dash for None."""
     if value is None:
         return "-"
     if value == float("inf"):
@@ -16,5 +16,5 @@ def number(value: float | None) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """One, or one and another, or one, another and a third."""
+    """The names, separated by commas and a last "and"."""
     return " and ".join([", ".join(names[:-1])] * (len(names) > 1) + [names[-1]])

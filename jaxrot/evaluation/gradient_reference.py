@@ -1,4 +1,4 @@
-"""The derivative of the nearest rotation in a wider arithmetic than float64, to judge others by."""
+"""The derivative of the nearest rotation in arithmetic wider than float64."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -7,18 +7,18 @@ from jaxrot.evaluation.reference import Reference, solve
 
 
 def pullback(matrices: ArrayLike, rotation_bar: ArrayLike, *, reference: Reference | None = None) -> NDArray:
-    """The cotangent of A for a cotangent of R: the derivative of ⟨R̄, R(A)⟩ with respect to A.
+    """Returns the cotangent of A for a cotangent of R: the derivative of ⟨R̄, R(A)⟩ with respect to A.
 
-    It is R [h]× with h = (tr(S)·1 − S)⁻¹ vee(RᵀR̄ − R̄ᵀR), S = RᵀA; the eigenvalues of the
-    inverted matrix are the sums of two singular values.
+    It is R [h]× with h = (tr(S)·1 − S)⁻¹ vee(RᵀR̄ − R̄ᵀR), S = RᵀA. The eigenvalues of the inverted matrix are the sums
+    of two singular values.
 
     Args:
         matrices: A, shape (n, 3, 3).
         rotation_bar: R̄, the same shape.
-        reference: `solve(matrices)`, where it is known already.
+        reference: `solve(matrices)`, if known.
 
     Returns:
-        Long double, shape (n, 3, 3); NaN where A is not finite, not finite where R is not unique.
+        Long double, shape (n, 3, 3); NaN if A is not finite, not finite if R is not unique.
     """
     solution = solve(matrices) if reference is None else reference
     bar = np.asarray(rotation_bar, np.longdouble)

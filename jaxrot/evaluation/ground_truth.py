@@ -1,4 +1,4 @@
-"""The matrices that every method is judged on, with everything about them that does not depend on the method."""
+"""Matrices with their reference solution and everything else that does not depend on the method."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -9,36 +9,26 @@ from jaxrot.evaluation import reference
 
 
 class Judged(NamedTuple):
-    """One batch of matrices in one dtype. Everything has one entry a matrix.
+    """A batch of matrices in one dtype. All arrays have one entry for each matrix."""
 
-    Attributes:
-        matrices: Shape (n, 3, 3), float32 or float64.
-        sets: The named parts of the batch; they may overlap.
-        solution: Nearest rotation and signed singular values in the reference's wider dtype; NaN where not finite.
-        condition: κ = s1/(s2+s3); inf where R is not unique, NaN where not finite.
-        size: ‖A‖_F/√3, which is 1 for a rotation.
-        is_inverted: det A < 0.
-        is_finite: No NaN and no infinity in the matrix.
-        is_normal: Flushing subnormal entries to zero, as XLA on CPU does, would not change R beyond eps.
-    """
-
-    matrices: np.ndarray
-    sets: dict[str, slice]
+    matrices: np.ndarray  # Shape (n, 3, 3), float32 or float64
+    sets: dict[str, slice]  # The named parts of the batch; they may overlap
+    # Nearest rotation and signed singular values in the reference's wider dtype; NaN if the matrix is not finite.
     solution: reference.Reference
-    condition: np.ndarray
-    size: np.ndarray
-    is_inverted: np.ndarray
-    is_finite: np.ndarray
-    is_normal: np.ndarray
+    condition: np.ndarray  # κ = s1/(s2+s3); inf if R is not unique, NaN if the matrix is not finite
+    size: np.ndarray  # ‖A‖_F/√3, which is 1 for a rotation
+    is_inverted: np.ndarray  # det A < 0
+    is_finite: np.ndarray  # No NaN and no infinity in the matrix
+    is_normal: np.ndarray  # Flushing subnormal entries to zero, as XLA on CPU does, would not change R beyond eps
 
 
 def judge(sets: Mapping[str, np.ndarray], dtype: str, whole: str | None = None) -> Judged:
-    """Rounds the matrices to a dtype, lays them into one batch and finds their nearest rotations.
+    """Returns the matrices, rounded to a dtype, as one batch with their nearest rotations.
 
     Args:
-        sets: Arrays of shape (n, 3, 3) by name. Rounding to float32 may overflow to infinity; that is counted.
+        sets: Arrays of shape (n, 3, 3) by name. Rounding to float32 may overflow to infinity.
         dtype: "float32" or "float64".
-        whole: A name for all of them together, or None.
+        whole: A name for the set of all matrices, or None.
     """
     with np.errstate(over="ignore", under="ignore"):
         parts = [array.astype(dtype) for array in sets.values()]

@@ -1,15 +1,15 @@
-"""Time a matrix: compiled beforehand, warmed up, all methods interleaved in rounds."""
+"""Time per matrix, in interleaved rounds of compiled and warmed up methods."""
 
 import random
 import time
 from collections.abc import Callable, Hashable, Mapping
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-# One sample is many calls in a row where a call is short: the clock and the loop around it must not be what is timed.
+# A sample of a short call repeats it, so that the clock and the loop add little to the time.
 SHORTEST_SAMPLE_S = 2e-3
 FEWEST_ROUNDS = 3
 MOST_ROUNDS = 31
@@ -19,47 +19,29 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 class Compiled(NamedTuple):
-    """A method compiled for one shape.
+    """A method compiled for one shape."""
 
-    Attributes:
-        call: From matrices of that shape, and starts where it takes them, to rotations.
-        compile_s: Seconds for tracing, lowering and compiling, no cache involved.
-    """
-
-    call: Callable
-    compile_s: float
+    call: Callable  # From matrices of that shape, and starts if it takes them, to rotations
+    compile_s: float  # Seconds for tracing, lowering and compiling, no cache involved
 
 
 class Timing(NamedTuple):
-    """The time of one method at one batch size, in ns a matrix.
+    """The time of one method at one batch size, in ns per matrix."""
 
-    Attributes:
-        method: The method's name.
-        dtype: "float32" or "float64".
-        batch: Matrices in a call.
-        median_ns: Median over the samples.
-        quartile_1_ns: A quarter of the samples were faster.
-        quartile_3_ns: A quarter of the samples were slower.
-        fastest_ns: The fastest sample.
-        samples: Number of samples, each in a round of its own.
-        calls_per_sample: Calls in a sample.
-        compile_s: Seconds to compile the method for this shape.
-    """
-
-    method: str
-    dtype: str
-    batch: int
-    median_ns: float
-    quartile_1_ns: float
-    quartile_3_ns: float
-    fastest_ns: float
-    samples: int
-    calls_per_sample: int
-    compile_s: float
+    method: str  # The method's name
+    dtype: str  # "float32" or "float64"
+    batch: int  # Matrices in a call
+    median_ns: float  # Median over the samples
+    quartile_1_ns: float  # A quarter of the samples were faster
+    quartile_3_ns: float  # A quarter of the samples were slower
+    fastest_ns: float  # The fastest sample
+    samples: int  # Number of samples, each in a round of its own
+    calls_per_sample: int  # Calls in a sample
+    compile_s: float  # Seconds to compile the method for this shape
 
 
 def compile_method(function: Callable, batch: int, dtype: str, *, arguments: int = 1) -> Compiled:
-    """Compiles a function of one array (batch, 3, 3), or of several, and takes the time."""
+    """Returns the compiled function of one or several arrays (batch, 3, 3), and the seconds to compile it."""
     start = time.perf_counter()
     shape = jax.ShapeDtypeStruct((batch, 3, 3), jnp.dtype(dtype))
     compiled = jax.jit(function).lower(*[shape] * arguments).compile()
@@ -69,8 +51,7 @@ def compile_method(function: Callable, batch: int, dtype: str, *, arguments: int
 def fill_batch(matrices: np.ndarray, batch: int) -> np.ndarray:
     """`batch` of the matrices in random order, repeated as often as needed.
 
-    The order is random because a small batch must not be all of one kind, and because runs of equal matrices would let
-    a branch predictor learn them.
+    In their own order a small batch would hold matrices of one kind only, and a branch predictor would learn the kind.
     """
     order = np.random.default_rng(0).permutation(len(matrices))
     return matrices[np.resize(order, batch)]
@@ -85,25 +66,22 @@ def interleave(
     fewest_rounds: int = FEWEST_ROUNDS,
     most_rounds: int = MOST_ROUNDS,
 ) -> tuple[dict[Name, list[float]], dict[Name, int]]:
-    """Times several functions in rounds, each once a round and in random order.
+    """Returns the seconds per call of every sample, and the number of calls in a sample, by name.
 
-    Whatever drifts (clock rate, temperature, somebody else's work) hits all of them alike, and none always runs behind
-    the same neighbour, in the cache that this one leaves.
+    Every function runs once in a round. Interleaving spreads drift (clock rate, temperature, other load) evenly. The
+    random order keeps any function from always inheriting the cache state of the same predecessor.
 
     Args:
         calls: The functions by name; each returns when its work is done.
-        budget_s: Rounds begin until this many seconds are spent.
-        clock: Seconds, ever rising.
-        shortest_sample_s: A sample repeats the call until it takes about that long.
-        fewest_rounds: Rounds to run whatever they cost.
-        most_rounds: Rounds after which more would not tell more.
-
-    Returns:
-        Seconds a call of every sample, and the calls in a sample, by name.
+        budget_s: A round starts only if fewer seconds are spent.
+        clock: A monotonic clock in seconds.
+        shortest_sample_s: A sample repeats a call until it takes about that long.
+        fewest_rounds: Rounds to run even beyond the budget.
+        most_rounds: Rounds to run at most.
     """
     repeats = {}
     for name, call in calls.items():
-        call()  # the first run touches fresh memory
+        call()  # the first call touches fresh memory
         begin = clock()
         call()
         repeats[name] = max(1, min(1000, round(shortest_sample_s / max(clock() - begin, 1e-9))))
@@ -132,22 +110,19 @@ def time_methods(
     budget_s: float,
     starts: np.ndarray | None = None,
 ) -> list[Timing]:
-    """Times methods on one batch, side by side.
+    """Returns the time of each method on the same batch, from interleaved rounds.
 
     Args:
         compiled: The methods, compiled for this batch size and the matrices' dtype.
-        matrices: Shape (n, 3, 3), n > 0; the batch is filled with them.
+        matrices: Shape (n, 3, 3), n > 0; they fill the batch.
         batch: Matrices in a call.
         budget_s: Seconds to spend, roughly.
-        starts: The rotations that the methods start from, one a matrix, where they take them.
-
-    Returns:
-        One `Timing` a method, in the same order.
+        starts: One rotation for each matrix, if the methods take a start.
     """
     arrays = [matrices] if starts is None else [matrices, starts]
-    # Equally many: the same random order, so that every matrix keeps its start.
+    # Both arrays have the same length and get the same random order, so that every matrix keeps its start.
     on_device = [jax.device_put(fill_batch(array, batch)) for array in arrays]
-    calls = {name: _blocking(method.call, on_device) for name, method in compiled.items()}
+    calls = {name: blocking(method.call, *on_device) for name, method in compiled.items()}
     samples, repeats = interleave(calls, budget_s=budget_s)
     timings = []
     for name, seconds in samples.items():
@@ -170,5 +145,6 @@ def time_methods(
     return timings
 
 
-def _blocking(call: Callable, arguments: list[jax.Array]) -> Callable[[], object]:
+def blocking(call: Callable, *arguments: Any) -> Callable[[], object]:
+    """The call as a function that returns when its result is ready."""
     return lambda: jax.block_until_ready(call(*arguments))

@@ -1,4 +1,4 @@
-"""`python -m jaxrot recommend`: options, their checks, and what is printed."""
+"""`python -m jaxrot recommend`: its options and their checks, and what it prints."""
 
 import argparse
 import math
@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxrot import Recommendation
 from jaxrot._recommend.candidates import Candidate
-from jaxrot._recommend.recommend import number_of_steps, recommend_step_by_step
+from jaxrot._recommend.recommend import recommend_step_by_step
 from jaxrot.console.arguments import path
 from jaxrot.console.configuration import measuring_configuration
 from jaxrot.console.environment import describe_environment
@@ -18,9 +18,9 @@ from jaxrot.console.extras import check_installed
 from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.printing import show
 from jaxrot.console.progress import progress
+from jaxrot.console.tables import Table, as_text
 from jaxrot.evaluation.formatting import number
 from jaxrot.report.inputs import Input, read_input
-from jaxrot.report.writing.tables import Table, as_text
 
 _DTYPES = ("float32", "float64")
 _WIDTH = 100
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance", metavar="E", required=True, help="the largest error ‖R - R*‖_F that is good enough, 1e-5 say"
     )
     parser.add_argument(
-        "--previous", type=path, metavar="FILE", help="rotations to start from, one a matrix, such as the last frame's"
+        "--previous", type=path, metavar="FILE", help="starting rotations, one per matrix, such as the last frame's"
     )
     parser.add_argument(
         "--dtype", metavar="DTYPE", help=f"{' or '.join(_DTYPES)} (float64 where FILE holds float64, else float32)"
@@ -41,10 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
-    """Measures and prints; the user's mistakes are found before anything is measured.
+    """Measures and prints. Mistakes of the user are found before anything is measured.
 
     Returns:
-        The exit status: 0, also where nothing meets the tolerance; the text says so.
+        The exit status: 0, even if no method meets the tolerance. The text says so.
 
     Raises:
         UserError: Something the user can fix.
@@ -60,13 +60,12 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     previous = None if options.previous is None else _read_previous(options.previous, given)
     dtype = options.dtype or given.dtype
     environment = describe_environment((dtype,))
-    steps = number_of_steps(has_previous=previous is not None)
-    with measuring_configuration(), progress(steps, interrupts) as advance:
+    with measuring_configuration(), progress(interrupts) as say:
         try:
             with np.errstate(over="ignore", under="ignore"):
-                result = recommend_step_by_step(matrices, tolerance, previous, dtype, advance)
+                result = recommend_step_by_step(matrices, tolerance, previous, dtype, say)
         except ValueError as error:
-            # What a file holds is only seen when all of it is looked at, before anything is measured.
+            # The content of the file is checked before anything is measured.
             raise UserError(str(error)) from None
     interrupts.hold()
     show(_as_text(result, given, environment))
@@ -84,7 +83,7 @@ def _parse_tolerance(word: str) -> float:
 
 
 def _read_previous(file: Path, given: Input) -> np.ndarray:
-    """The starts, in the order of the matrices: by name where a file holds several arrays."""
+    """The starts in the order of the matrices. The names match them if a file holds several arrays."""
     starts = read_input(file, "--previous")
     if len(given.sets) == len(starts.sets) == 1:
         pairs = [(*given.sets.values(), *starts.sets.values())]
@@ -97,9 +96,7 @@ def _read_previous(file: Path, given: Input) -> np.ndarray:
         )
     for matrices, rotations in pairs:
         if len(matrices) != len(rotations):
-            raise UserError(
-                f"--previous {shown(file)}: {len(rotations):,} rotations; expected {len(matrices):,}, one a matrix"
-            )
+            raise UserError(f"--previous {shown(file)}: {len(rotations):,} rotations; expected {len(matrices):,}")
     return np.concatenate([rotations for _, rotations in pairs])
 
 

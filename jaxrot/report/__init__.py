@@ -1,7 +1,7 @@
 """`python -m jaxrot report`: error against run time of every method, on real matrices.
 
-`command` reads the options and `sections` measures all parts: `measurement` the methods, `beside` and `peers` other
-packages, `warm_starts` the steps, `stability` and `guards` what breaks where and without what; `bench` the library's
-own speed goals. `content` holds what came of it, `findings` and `comparison` say what it means, `drawing` and `writing`
-make the files. `readme` fills the README. Nothing here is imported by the library itself.
+`command` reads the options into a `plan`, and `run` measures all of it on the `inputs`. `measure` holds the
+measurements, and `peers` the other packages to compare with. `data` is the record of the results, and `comparison`
+compares it with an earlier report. `show` makes sentences, tables, pictures and files. `readme` fills the README. The
+library itself imports nothing from here.
 """

@@ -1,4 +1,4 @@
-"""This report against an earlier one: what got slower, what got worse."""
+"""Times and errors compared with those of an earlier report."""
 
 import json
 from collections.abc import Sequence
@@ -10,86 +10,60 @@ import numpy as np
 from jaxrot.console.errors import UserError, shown
 from jaxrot.evaluation.accuracy import Accuracy
 from jaxrot.evaluation.timing import Timing
-from jaxrot.report.measurement import WHOLE, Results
+from jaxrot.report.inputs import WHOLE
+from jaxrot.report.measure.results import Results
 
-# The median of fewer ratios is as good as the ratio of the method that is looked at.
+# The median of fewer ratios says little about the machine: it may be the ratio of the method in question.
 _FEWEST_FOR_MACHINE = 4
 EXPECTED = "expected the report.json of an earlier run"
 
 
 class TimeChange(NamedTuple):
-    """One method at one batch size, then and now.
+    """Times of one method at one batch size in two runs."""
 
-    Attributes:
-        method: Its name.
-        dtype: "float32" or "float64".
-        batch: Matrices in a call.
-        before_ns: Median a matrix in the earlier run.
-        now_ns: Median a matrix in this one.
-        ratio: now / before; above 1 it takes longer.
-        relative: The ratio over the median of all ratios, which is what the machine itself contributes.
-        verdict: "slower" or "faster" where the quartiles of both runs stand apart, also when the machine's share is
-            taken out, and the ratio stands out from those of the other methods at that batch size; else "".
-    """
-
-    method: str
-    dtype: str
-    batch: int
-    before_ns: float
-    now_ns: float
-    ratio: float
-    relative: float
+    method: str  # Its name
+    dtype: str  # "float32" or "float64"
+    batch: int  # Matrices in a call
+    before_ns: float  # Median per matrix in the earlier run
+    now_ns: float  # Median per matrix in this run
+    ratio: float  # now / before
+    relative: float  # The ratio over the machine's share
+    # "slower" or "faster" if the quartiles of the runs do not overlap, with and without the machine's share, and the
+    # ratio is an outlier at this batch size; else "".
     verdict: str
 
 
 class ErrorChange(NamedTuple):
-    """One method on the whole input, then and now.
+    """Errors of one method on the whole input in two runs."""
 
-    Attributes:
-        method: Its name.
-        dtype: "float32" or "float64".
-        before: 99th percentile of the forward error in the earlier run; None where there was none.
-        now: The same in this one.
-        outside_before: Matrices outside the contract, input and families together.
-        outside_now: The same in this one.
-        verdict: "worse", "better", or "" where neither number changed by more than a twentieth.
-    """
-
-    method: str
-    dtype: str
-    before: float | None
-    now: float | None
-    outside_before: int
-    outside_now: int
+    method: str  # Its name
+    dtype: str  # "float32" or "float64"
+    before: float | None  # 99th percentile of the forward error in the earlier run; None if no error was defined
+    now: float | None  # The same in this run
+    outside_before: int  # Matrices of input and families outside the contract in the earlier run
+    outside_now: int  # The same in this run
+    # "worse" or "better" if more or fewer matrices are outside, or the error changed by more than a twentieth; else "".
     verdict: str
 
 
 class Comparison(NamedTuple):
-    """Two runs.
+    """Two runs compared."""
 
-    Attributes:
-        name: Of the earlier file.
-        environment: Of the earlier run.
-        machine: Median of all ratios of times: what changed for all methods alike; 1 where they are too few to tell.
-        times: One entry a method, dtype and batch size that both runs have.
-        errors: One entry a method and dtype that both have; empty where the input is another. Families count where both
-            runs drew as many matrices.
-        remarks: What cannot be compared and why, one sentence each.
-    """
-
-    name: str
-    environment: dict[str, str]
-    machine: float
-    times: tuple[TimeChange, ...]
+    name: str  # Of the earlier file
+    environment: dict[str, str]  # Of the earlier run
+    machine: float  # The machine's share in the times: the median of all ratios, or 1 if there are too few
+    times: tuple[TimeChange, ...]  # One entry for each method, dtype and batch size of both runs
+    # One entry for each method and dtype of both runs; empty if the inputs differ. Only families of which both runs
+    # drew the same number of matrices count.
     errors: tuple[ErrorChange, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # What cannot be compared and why, one sentence each
 
 
 def read_report(path: Path) -> dict[str, Any]:
-    """The content of an earlier report.json.
+    """Returns the content of an earlier report.json.
 
     Raises:
-        UserError: There is no such file, or it is none.
+        UserError: The file does not exist, or is no report.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -113,26 +87,31 @@ def read_report(path: Path) -> dict[str, Any]:
 
 
 def compare(name: str, before: dict[str, Any], results: Results, sets: dict[str, int]) -> Comparison:
-    """Sets an earlier report beside new results.
+    """Compares new results with those of an earlier report.
 
     Args:
-        name: The earlier file's, for the reader.
+        name: The name of the earlier file.
         before: Its content.
-        results: The new ones.
-        sets: Names and sizes of the new input's sets.
+        results: The new results.
+        sets: Names and sizes of the sets in the new input.
     """
     remarks = []
     machine, times = _times([Timing(**entry) for entry in before["timing"]], results.timing)
     if 0 < len(times) < _FEWEST_FOR_MACHINE:
-        remarks.append("Too few times are common to tell the machine's share in them.")
+        remarks.append("Too few times are common to both runs to tell the machine's share.")
     if not times:
         remarks.append("No method was timed in both runs at the same batch size and dtype.")
-    errors: tuple[ErrorChange, ...] = ()
-    if before["input"]["sets"] == sets:
-        errors = _errors(before["accuracy"], results)
-    else:
+    is_same_input = before["input"]["sets"] == sets
+    if not is_same_input:
         remarks.append("The earlier run was on another input; errors are not compared.")
-    return Comparison(name, before["environment"], machine, times, errors, tuple(remarks))
+    return Comparison(
+        name=name,
+        environment=before["environment"],
+        machine=machine,
+        times=times,
+        errors=_errors([Accuracy(**entry) for entry in before["accuracy"]], results.accuracy) if is_same_input else (),
+        remarks=tuple(remarks),
+    )
 
 
 def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[float, tuple[TimeChange, ...]]:
@@ -159,10 +138,10 @@ def _times(before: Sequence[Timing], now: Sequence[Timing]) -> tuple[float, tupl
 
 
 def _usual(ratios: Sequence[float]) -> tuple[float, float]:
-    """Between which ratios a method does not stand out: one and a half times the interquartile range beyond either end.
+    """The range of ratios without outliers: the quartiles, extended by one and a half times their range.
 
-    Times differ more from run to run than within one: of 126 ratios of the same code 35 had their quartiles apart, and
-    3 of these stand out.
+    Times differ more between runs than within one. Of 126 ratios of the same code, the quartiles did not overlap in 35,
+    and 3 of these are outliers.
     """
     if len(ratios) < _FEWEST_FOR_MACHINE:
         return 1.0, 1.0
@@ -181,41 +160,39 @@ def _verdict(old: Timing, new: Timing, machine: float, usual: tuple[float, float
     return ""
 
 
-def _errors(before: Sequence[dict[str, Any]], results: Results) -> tuple[ErrorChange, ...]:
-    now = [entry._asdict() for entry in results.accuracy]
-    # A run with --quick draws fewer matrices of each family; what is outside of them says nothing about another run's.
+def _errors(before: Sequence[Accuracy], now: Sequence[Accuracy]) -> tuple[ErrorChange, ...]:
+    # A run with --quick draws fewer matrices of each family, so that the numbers outside are not comparable.
     common = {_set(entry) for entry in before} & {_set(entry) for entry in now}
+    earlier = {(entry.method, entry.dtype): entry for entry in before if entry.set_name == WHOLE}
 
-    def outside(entries: Sequence[dict[str, Any]], method: str, dtype: str) -> int:
-        return sum(
-            entry["outside"]
-            for entry in entries
-            if (entry["method"], entry["dtype"]) == (method, dtype)
-            and _set(entry) in common
-            # The input's parts are in the whole.
-            and (entry["group"] != "input" or entry["set_name"] == WHOLE)
-        )
+    def outside(entries: Sequence[Accuracy], key: tuple[str, str]) -> int:
+        of_method = [entry for entry in entries if (entry.method, entry.dtype) == key and _set(entry) in common]
+        # The whole input includes the other sets of the input.
+        return sum(entry.outside for entry in of_method if entry.group != "input" or entry.set_name == WHOLE)
 
-    earlier = {(entry["method"], entry["dtype"]): entry for entry in before if entry["set_name"] == WHOLE}
-    changes = []
-    for entry in now:
-        key = entry["method"], entry["dtype"]
-        if entry["set_name"] == WHOLE and key in earlier:
-            old, new = (None if e["forward_99th"] is None else float(e["forward_99th"]) for e in (earlier[key], entry))
-            counts = outside(before, *key), outside(now, *key)
-            changes.append(ErrorChange(*key, old, new, *counts, _error_verdict((old, counts[0]), (new, counts[1]))))
-    return tuple(changes)
+    return tuple(
+        _error_change(earlier[key], entry, outside(before, key), outside(now, key))
+        for entry in now
+        if entry.set_name == WHOLE and (key := (entry.method, entry.dtype)) in earlier
+    )
 
 
-def _set(entry: dict[str, Any]) -> tuple[str, str, int]:
-    return entry["group"], entry["set_name"], entry["matrices"]
+def _set(entry: Accuracy) -> tuple[str, str, int]:
+    return entry.group, entry.set_name, entry.matrices
 
 
-def _error_verdict(old: tuple[float | None, int], new: tuple[float | None, int]) -> str:
-    if _is_more(old, new):
-        return "worse"
-    return "better" if _is_more(new, old) else ""
-
-
-def _is_more(small: tuple[float | None, int], large: tuple[float | None, int]) -> bool:
-    return large[1] > small[1] or (None not in (small[0], large[0]) and (large[0] or 0.0) > 1.05 * (small[0] or 0.0))
+def _error_change(old: Accuracy, new: Accuracy, outside_before: int, outside_now: int) -> ErrorChange:
+    # The file holds an infinite error as a string.
+    before, now = (None if error is None else float(error) for error in (old.forward_99th, new.forward_99th))
+    grew = before is not None and now is not None and now > 1.05 * before
+    shrank = before is not None and now is not None and before > 1.05 * now
+    better = "better" if outside_now < outside_before or shrank else ""
+    return ErrorChange(
+        method=new.method,
+        dtype=new.dtype,
+        before=before,
+        now=now,
+        outside_before=outside_before,
+        outside_now=outside_now,
+        verdict="worse" if outside_now > outside_before or grew else better,
+    )

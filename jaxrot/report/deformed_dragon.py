@@ -1,12 +1,10 @@
-"""The real input that ships with the report: shape-matching matrices of the Stanford dragon, treated badly.
+"""The input that ships with the report: shape-matching matrices of deformations of the Stanford dragon.
 
-Source: Müller et al. 2016, section 4 and Fig. 7 (clustered shape matching of this model); the vertices are
-those of `jaxrot.scenes.dragon`.
+Source: Müller et al. 2016, section 4 and Fig. 7, clustered shape matching of this model.
 """
 
 import itertools
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,18 +13,6 @@ from jaxrot.scenes.dragon import rest_vertices
 
 NAME = "Stanford dragon"
 CLUSTER_SIZE = 32
-
-
-class Stage(NamedTuple):
-    """One deformation of the dragon.
-
-    Attributes:
-        name: The set under which the report counts this stage; several stages may share it.
-        vertices: The deformed vertices, float64 of shape (n, 3).
-    """
-
-    name: str
-    vertices: np.ndarray
 
 
 def twisted(vertices: np.ndarray, angle: float) -> np.ndarray:
@@ -54,19 +40,19 @@ def scrambled(vertices: np.ndarray, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
 
 
-def stages(vertices: np.ndarray, seed: int = 0) -> Iterator[Stage]:
-    """The dragon at rest and in every deformation of the report."""
-    yield Stage("at rest", vertices)
+def stages(vertices: np.ndarray, seed: int = 0) -> Iterator[tuple[str, np.ndarray]]:
+    """Set name and vertices of the dragon at rest and in every deformation; several may share a set."""
+    yield "at rest", vertices
     for angle in (0.5, 2.0, 6.0):
-        yield Stage("twisted", twisted(vertices, angle))
+        yield "twisted", twisted(vertices, angle)
     for angle in (1.0, 4.0):
-        yield Stage("bent", bent(vertices, angle))
+        yield "bent", bent(vertices, angle)
     for height in (0.5, 0.1, 0.01):
-        yield Stage("squashed", squashed(vertices, height))
-    yield Stage("flat", squashed(vertices, 0.0))
+        yield "squashed", squashed(vertices, height)
+    yield "flat", squashed(vertices, 0.0)
     for height in (-0.01, -0.1, -0.5, -1.0):
-        yield Stage("inverted", squashed(vertices, height))
-    yield Stage("scrambled", scrambled(vertices, seed))
+        yield "inverted", squashed(vertices, height)
+    yield "scrambled", scrambled(vertices, seed)
 
 
 def cluster_matrices(current: np.ndarray, rest: np.ndarray, clusters: np.ndarray) -> np.ndarray:
@@ -90,8 +76,8 @@ def dragon_matrices(cluster_count: int) -> dict[str, np.ndarray]:
     """The matrices of every cluster at every stage, float64, by the name of the stage."""
     rest = rest_vertices()
     clusters = overlapping_clusters(rest, cluster_count, CLUSTER_SIZE)
-    by_name = itertools.groupby(stages(rest), key=lambda stage: stage.name)
+    by_name = itertools.groupby(stages(rest), key=lambda stage: stage[0])
     return {
-        name: np.concatenate([cluster_matrices(stage.vertices, rest, clusters) for stage in group])
+        name: np.concatenate([cluster_matrices(vertices, rest, clusters) for _, vertices in group])
         for name, group in by_name
     }

@@ -1,4 +1,4 @@
-"""What the report measures on: the dragon, or the user's own file, as named sets of matrices."""
+"""The matrices that the report measures, as named sets: the dragon, or the user's own file."""
 
 import zlib
 from collections.abc import Mapping
@@ -13,30 +13,29 @@ from jaxrot.console.errors import UserError, shown
 from jaxrot.families import FAMILIES
 from jaxrot.report import deformed_dragon
 
-# What NumPy says when it must not unpickle an array.
+WHOLE = "whole input"  # the name of all sets together
+# The error of NumPy if it must not unpickle an array.
 _OBJECTS = "Object arrays cannot be loaded"
 _OBJECTS_REFUSED = "dtype object, which holds Python objects; save array.astype(numpy.float64) instead"
 EXPECTED = "expected a .npy or .npz file with a real array of shape (..., 3, 3)"
 
 
 class Input(NamedTuple):
-    """The matrices of one report.
+    """The matrices of one report."""
 
-    Attributes:
-        name: What the report calls them.
-        sets: Named parts, each float64 of shape (n, 3, 3), n > 0.
-        remarks: What the reader must know about how they were read, one sentence each.
-        dtype: "float32" where the numbers need no more than that; "float64" for float64, and wider.
-    """
+    name: str  # What the report calls them
+    sets: dict[str, np.ndarray]  # Named parts, each float64 of shape (n, 3, 3), n > 0
+    remarks: tuple[str, ...] = ()  # What the reader must know about how they were read, one sentence each
+    dtype: str = "float64"  # "float64" if the file holds float64, else "float32"
 
-    name: str
-    sets: dict[str, np.ndarray]
-    remarks: tuple[str, ...] = ()
-    dtype: str = "float64"
+    @property
+    def counts(self) -> dict[str, int]:
+        """The number of matrices in each set."""
+        return {name: len(part) for name, part in self.sets.items()}
 
 
 def dragon_input(cluster_count: int) -> Input:
-    """The input that ships with the report."""
+    """The matrices of the dragon, which ships with the report."""
     remark = (
         f"A_pq of {cluster_count} overlapping clusters of {deformed_dragon.CLUSTER_SIZE} vertices in each of 15"
         " deformations of the dragon (source: Stanford University Computer Graphics Laboratory)."
@@ -45,23 +44,22 @@ def dragon_input(cluster_count: int) -> Input:
 
 
 def family_matrices(count: int, dtype: str) -> dict[str, np.ndarray]:
-    """`count` matrices of every family, the same every time."""
+    """`count` matrices of every family, from a fixed seed."""
     return {name: family.sample(count, dtype=np.dtype(dtype), seed=0).matrices for name, family in FAMILIES.items()}
 
 
 def read_input(path: Path, option: str = "--input") -> Input:
-    """Reads the user's own matrices.
+    """Returns the user's own matrices from a .npy or .npz file.
 
-    Every array of shape (..., 3, 3) in an archive becomes a set of its own; what else the archive holds is left out and
-    said so.
+    Every array of shape (..., 3, 3) in an archive is a set. A remark names the other arrays, which are left out.
 
     Args:
         path: The file.
-        option: What the user calls it, for the messages.
+        option: The option that names the file, for error messages.
 
     Raises:
-        UserError: There is no such file, it cannot be read as NumPy arrays without pickle, or it holds no real,
-            non-empty array of shape (..., 3, 3).
+        UserError: The file does not exist, is not readable without pickle, or has no real, non-empty array of shape
+            (..., 3, 3).
     """
     name = f"{option} {shown(path)}"
     if not path.is_file():
@@ -83,8 +81,8 @@ def read_input(path: Path, option: str = "--input") -> Input:
 
 
 def thinned(given: Input, most: int) -> Input:
-    """At most about `most` matrices, drawn at random from every set alike: the reference is slow."""
-    total = sum(map(len, given.sets.values()))
+    """A random sample of about `most` matrices, the same share of every set, because the reference is slow."""
+    total = sum(given.counts.values())
     if total <= most:
         return given
     random = np.random.default_rng(0)
@@ -92,15 +90,14 @@ def thinned(given: Input, most: int) -> Input:
     for name, part in given.sets.items():
         count = max(1, len(part) * most // total)
         sets[name] = part[np.sort(random.choice(len(part), count, replace=False))]
-    kept = sum(map(len, sets.values()))
-    remark = f"A random sample: {kept:,} of the {total:,} matrices in the file."
-    return given._replace(sets=sets, remarks=(*given.remarks, remark))
+    sample = given._replace(sets=sets)
+    remark = f"A random sample: {sum(sample.counts.values()):,} of the {total:,} matrices in the file."
+    return sample._replace(remarks=(*given.remarks, remark))
 
 
 def _load(path: Path, name: str) -> np.ndarray | dict[str, np.ndarray | str]:
-    """The array in the file or, of an archive, all arrays; instead of one that cannot be read, why that is."""
-    # Pickle would run code out of the file; an object array is refused instead. The file is opened here because
-    # `np.load` leaves that of a torn archive open.
+    """The array in the file, or all arrays of an archive. An array that cannot be read is replaced by the reason."""
+    # Pickle would run code from the file. The file is opened here, because `np.load` does not close a torn archive.
     try:
         with path.open("rb") as file:
             loaded = np.load(file, allow_pickle=False)
@@ -124,14 +121,14 @@ def _member(archive: Mapping[str, np.ndarray], part: str) -> np.ndarray | str:
 
 
 def _problem(array: np.ndarray | str) -> str | None:
-    """Why an array cannot be measured on, or None."""
+    """Why an array cannot be measured, or None."""
     if isinstance(array, str):
         return array
     if not isinstance(array, np.ndarray):
         return "no NumPy array"
     if array.shape[-2:] != (3, 3):
         return f"shape {array.shape}{layout_hint(array.shape)}"
-    # Of the floating dtypes only long double is wider than float64. Its digits would be lost without a word.
+    # Long double is the only floating dtype wider than float64. Its digits would be lost silently.
     if array.dtype.kind not in "fiub" or (array.dtype.kind == "f" and array.dtype.itemsize > 8):
         return f"dtype {array.dtype}; save {_conversion(array.dtype)} instead"
     if array.size == 0:
@@ -140,11 +137,9 @@ def _problem(array: np.ndarray | str) -> str | None:
 
 
 def _conversion(dtype: np.dtype) -> str:
-    if dtype.kind == "c":
-        return "array.real.astype(numpy.float64)"
     if dtype.names is not None:
         return "numpy.lib.recfunctions.structured_to_unstructured(array, numpy.float64)"
-    return "array.astype(numpy.float64)"
+    return f"array{'.real' if dtype.kind == 'c' else ''}.astype(numpy.float64)"
 
 
 def _flat(array: np.ndarray) -> np.ndarray:

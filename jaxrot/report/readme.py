@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import jaxrot
+from jaxrot.console.tables import Table, as_markdown
 from jaxrot.evaluation.domain import largest_condition
 from jaxrot.evaluation.formatting import listed, number
 from jaxrot.evaluation.timing import Timing
-from jaxrot.report.drawing import pictures
-from jaxrot.report.findings import largest_batch
-from jaxrot.report.guards.prices import Time
-from jaxrot.report.guards.tables import ratio_words
-from jaxrot.report.measurement import WHOLE
-from jaxrot.report.writing.tables import Table, as_markdown
+from jaxrot.report.inputs import WHOLE
+from jaxrot.report.measure.ablation_cost import Time
+from jaxrot.report.measure.results import largest_batch
+from jaxrot.report.show import pictures
+from jaxrot.report.show.guard_tables import ratio_words
 
 PICTURES = (
     pictures.METHODS,

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     scene = _build(options.scene, options.mesh)
     steps = scene.steps if steps is None else steps
     environment = describe_environment(("float32",))
-    with progress(min(steps, _FRAMES) + 1, interrupts) as advance:
+    with progress(interrupts) as advance:
         recording = record(scene, steps, _FRAMES, advance, interrupts)
         pictures = _draw(scene, recording, advance, interrupts)
     files = {

@@ -16,8 +16,10 @@ from jaxrot.__main__ import main
 from jaxrot._recommend import candidates
 from jaxrot.console.interrupts import Interrupts, watched
 from jaxrot.report import command as report
-from jaxrot.report import measurement, sections
-from jaxrot.report.writing import document, records
+from jaxrot.report.data import ReportData
+from jaxrot.report.inputs import Input
+from jaxrot.report.measure.results import Results
+from jaxrot.report.show import document, records
 from jaxrot.scenes.scene import Scene
 from jaxrot.simulate import animation, recording
 from jaxrot.simulate import command as simulate
@@ -101,7 +103,7 @@ def test_before_the_first_step_nothing_is_finished(falling, monkeypatch, capsys)
 
 def test_the_steps_before_an_interruption_are_drawn_and_written(falling, monkeypatch, capsys):
     @contextlib.contextmanager
-    def progress(steps, interrupts):
+    def progress(interrupts):
         yield lambda step: signal.raise_signal(signal.SIGINT) if step == "step 2 of 3" else None
 
     monkeypatch.setattr(simulate, "progress", progress)
@@ -161,7 +163,7 @@ def test_a_long_stretch_between_two_frames_is_interrupted(monkeypatch):
 
 
 def test_a_report_is_written_without_pictures_where_the_drawing_is_interrupted(tmp_path, monkeypatch, capsys):
-    nothing = sections.Measured(measurement.Results([], [], ()), None, ())
+    nothing = ReportData(given=Input("none", {}), dtypes=(), results=Results([], [], ()))
     monkeypatch.setattr(report, "measure", lambda *arguments: nothing)
     monkeypatch.setattr(report, "draw_pictures", _interrupted)
     for module, name in (

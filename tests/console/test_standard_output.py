@@ -13,8 +13,10 @@ import jaxrot
 from jaxrot.__main__ import main
 from jaxrot.recommending import command as recommending
 from jaxrot.report import command as report
-from jaxrot.report import measurement, sections
-from jaxrot.report.writing import document, records
+from jaxrot.report.data import ReportData
+from jaxrot.report.inputs import Input
+from jaxrot.report.measure.results import Results
+from jaxrot.report.show import document, records
 from jaxrot.scenes.scene import Scene
 from jaxrot.simulate import command as simulate
 from jaxrot.simulate.catalogue import Entry
@@ -36,7 +38,7 @@ def nothing_measured(tmp_path, monkeypatch):
     np.save("own.npy", np.ones((2, 3, 3)))
     monkeypatch.setattr(recommending, "recommend_step_by_step", lambda *arguments: None)
     monkeypatch.setattr(recommending, "_as_text", lambda *arguments: "text")
-    nothing = sections.Measured(measurement.Results([], [], ()), None, ())
+    nothing = ReportData(given=Input("none", {}), dtypes=(), results=Results([], [], ()))
     monkeypatch.setattr(report, "measure", lambda *arguments: nothing)
     monkeypatch.setattr(report, "draw_pictures", lambda content: {"pareto.png": b"picture"})
     monkeypatch.setattr(report.bench, "run_bench", lambda *arguments: ())
@@ -45,8 +47,8 @@ def nothing_measured(tmp_path, monkeypatch):
         (document, "as_terminal_text"),
         (records, "as_json"),
         (records, "as_bench_json"),
-        (report.bench_document, "as_bench_markdown"),
-        (report.bench_document, "as_bench_text"),
+        (document, "as_bench_markdown"),
+        (document, "as_bench_text"),
     ):
         monkeypatch.setattr(module, name, lambda *arguments: "text")
     monkeypatch.setattr(simulate, "_PICTURES", {})

@@ -8,35 +8,32 @@ import pytest
 
 import jaxrot
 from jaxrot.__main__ import main
-from jaxrot.report import bench
-from jaxrot.report.bench import Goal
-from jaxrot.report.writing.tables import goals_table
+from jaxrot.report.measure import bench
+from jaxrot.report.measure.bench import Goal
+from jaxrot.report.show.tables import goals_table
 
 FEW = ("higham_newton", "svd", "foam", "quaternion_average")
 
 
 @pytest.fixture(scope="module")
 def measured():
-    steps = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jaxrot, "METHODS", {name: jaxrot.METHODS[name] for name in FEW})
         patch.setattr(jaxrot, "DEFAULT_METHOD", "foam")
         patch.setattr(jaxrot, "nearest_rotation", functools.partial(jaxrot.nearest_rotation, method="foam"))
         # Few shapes: compiling is what costs, and the same program at the same shape is compiled once.
         size = bench.Size(2, 32, 32, (32, 48), budget_s=0.0)
-        return bench.run_bench(size, steps.append), steps
+        return bench.run_bench(size)
 
 
 @pytest.mark.exhaustive
 def test_every_goal_is_measured_at_its_batch(measured):
-    result, steps = measured
-    assert steps == [f"bench: {name}" for name in bench.GROUPS]
-    batches = {goal.what: goal.batch for goal in result.goals}
+    batches = {goal.what: goal.batch for goal in measured.goals}
     assert batches["svd over default"] == batches["value and VJP over value"] == 32
     assert batches["svd over default in blocks"] == batches["MiB beside input and output, in blocks"] == 32
     assert batches["slowest over fastest batch, a matrix"] == 48
-    assert {goal.batch for goal in result.goals if "fastest other" in goal.what} == {1, 2}
-    assert all(0 < goal.quartile_1 <= goal.median <= goal.quartile_3 for goal in result.goals)
+    assert {goal.batch for goal in measured.goals if "fastest other" in goal.what} == {1, 2}
+    assert all(0 < goal.quartile_1 <= goal.median <= goal.quartile_3 for goal in measured.goals)
 
 
 def test_a_ratio_is_that_of_the_times_it_names(monkeypatch):
@@ -70,14 +67,14 @@ def test_a_goal_is_met_on_its_own_side(median, at_least, met):
 
 @pytest.mark.exhaustive
 def test_the_command_writes_and_prints_the_table(measured, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(bench, "run_bench", lambda size, advance: measured[0])
+    monkeypatch.setattr(bench, "run_bench", lambda size: measured)
     assert main(["report", "--bench", "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     text = (tmp_path / "out" / "bench.md").read_text(encoding="utf-8")
     for words in (shown, text):
         assert "svd over default in blocks" in words
     content = json.loads((tmp_path / "out" / "bench.json").read_text(encoding="utf-8"))
-    assert len(content["goals"]) == len(measured[0].goals)
+    assert len(content["goals"]) == len(measured.goals)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"bench.md", "bench.json"}
 
 

@@ -12,8 +12,8 @@ from matplotlib.image import imread
 import jaxrot
 from jaxrot.__main__ import main
 from jaxrot.console.configuration import measuring_configuration
-from jaxrot.report import command, measurement
-from jaxrot.report.inputs import Input, read_input, thinned
+from jaxrot.report import command
+from jaxrot.report.inputs import WHOLE, Input, read_input, thinned
 
 FILES = {"report.md", "report.html", "report.csv", "report.json", "pareto.png", "survival.png"}
 
@@ -37,7 +37,7 @@ def report(tmp_path_factory, own_matrices):
 
 
 def test_the_dragon_is_the_default_input(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command, "_QUICK", command._QUICK._replace(clusters=5, timing_budget_s=0.0))
+    monkeypatch.setattr(command, "QUICK", command.QUICK._replace(clusters=5, timing_budget_s=0.0))
     assert main(["report", "--quick", "--methods", "foam", "--batch", "64", "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr()
     assert "Stanford dragon: 75 matrices, float32" in shown.out
@@ -91,7 +91,7 @@ def test_csv_and_json_agree(report):
         for name, value in entry.items():
             assert row[name] == ("" if value is None else str(value))
     timed = [row for row in rows if row["median_ns_batch_64"]]
-    assert {(row["group"], row["set_name"]) for row in timed} == {("input", measurement.WHOLE)}
+    assert {(row["group"], row["set_name"]) for row in timed} == {("input", WHOLE)}
     for entry in content["timing"]:
         (row,) = [row for row in timed if (row["method"], row["dtype"]) == (entry["method"], entry["dtype"])]
         assert float(row[f"median_ns_batch_{entry['batch']}"]) == entry["median_ns"] > 0

@@ -6,11 +6,11 @@ import pytest
 from jaxrot.evaluation.accuracy import Accuracy
 from jaxrot.evaluation.timing import Timing
 from jaxrot.report.comparison import compare, read_report
-from jaxrot.report.content import Content
-from jaxrot.report.inputs import Input
-from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.writing.beside_tables import compared_sentence, errors_compared_table, times_compared_table
-from jaxrot.report.writing.records import as_json
+from jaxrot.report.data import ReportData
+from jaxrot.report.inputs import WHOLE, Input
+from jaxrot.report.measure.results import Results
+from jaxrot.report.show.comparison_tables import compared_sentence, errors_compared_table, times_compared_table
+from jaxrot.report.show.records import as_json
 
 GIVEN = Input("mine", {"own": np.ones((10, 3, 3))})
 SETS = {"own": 10}
@@ -31,7 +31,8 @@ def results(times, errors):
 def written(measured, tmp_path):
     """The report.json of an earlier run, read back."""
     path = tmp_path / "old.json"
-    path.write_text(as_json(Content(GIVEN, {"date": "then"}, {}, ("float32",), measured)), encoding="utf-8")
+    data = ReportData(GIVEN, ("float32",), measured, environment={"date": "then"})
+    path.write_text(as_json(data), encoding="utf-8")
     return read_report(path)
 
 
@@ -147,5 +148,5 @@ def test_nothing_in_common_is_said(tmp_path):
 def test_a_comparison_is_json_too(tmp_path):
     before = written(results(FOUR, RIGHT), tmp_path)
     comparison = compare("old.json", before, results(FOUR, RIGHT), SETS)
-    content = Content(GIVEN, {}, {}, ("float32",), results(FOUR, RIGHT), comparison=comparison)
-    assert json.loads(as_json(content))["comparison"]["times"][0]["method"] == "foam"
+    data = ReportData(GIVEN, ("float32",), results(FOUR, RIGHT), comparison=comparison)
+    assert json.loads(as_json(data))["comparison"]["times"][0]["method"] == "foam"

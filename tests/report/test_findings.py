@@ -4,12 +4,13 @@ import pytest
 import jaxrot
 from jaxrot.evaluation.accuracy import Accuracy
 from jaxrot.evaluation.timing import Timing
-from jaxrot.report.contenders import Beside, Contender, Quantiles, Spread, beyond_front
-from jaxrot.report.content import Content
-from jaxrot.report.findings import faster_outside, findings, largest_batch
-from jaxrot.report.inputs import Input
-from jaxrot.report.measurement import WHOLE, Results
-from jaxrot.report.warm_starts import COLD_START, WarmStart
+from jaxrot.report.data import ReportData
+from jaxrot.report.inputs import WHOLE, Input
+from jaxrot.report.measure.front import beyond_front
+from jaxrot.report.measure.peer_comparison import ComparedMethod, PeerComparison
+from jaxrot.report.measure.results import Quantiles, Results, Spread, largest_batch
+from jaxrot.report.measure.warm_starts import COLD_START, WarmStart
+from jaxrot.report.show.findings import faster_outside, findings
 
 DEFAULT = jaxrot.DEFAULT_METHOD
 
@@ -26,22 +27,35 @@ def timing(method, median, *, spread=0.1, batch=100, dtype="float32"):
 def said(accuracies, timings, **parts):
     given = Input("mine", {"own": np.ones((10, 3, 3))})
     dtypes = tuple(dict.fromkeys(entry.dtype for entry in timings))
-    return "\n".join(findings(Content(given, {}, {}, dtypes, Results(accuracies, timings, ()), **parts)))
+    return "\n".join(findings(ReportData(given, dtypes, Results(accuracies, timings, ()), **parts)))
 
 
 def contender(name, time, error, *, is_own=False, spread=0.1, gradient=None):
     around = Spread(time, time * (1 - spread), time * (1 + spread))
     quantiles = Quantiles(error / 2, error, 2 * error)
     errors, times = (Quantiles(*[gradient] * 3), Spread(*(2 * value for value in around))) if gradient else (None, None)
-    head = (name, "", is_own, "float32", "float32", 1, 100, 0, 0)
-    return Contender(*head, quantiles, around, errors, 0, (), times)
+    return ComparedMethod(
+        name=name,
+        description="",
+        is_own=is_own,
+        dtype="float32",
+        computes_in="float32",
+        threads=1,
+        batch=100,
+        no_result=0,
+        outside=0,
+        error=quantiles,
+        time=around,
+        gradient_error=errors,
+        gradient_time=times,
+    )
 
 
 def test_the_fastest_within_the_contract_is_named_and_compared():
     times = [timing("svd", 1000), timing(DEFAULT, 100), timing("foam", 20)]
     accuracies = [accuracy("svd"), accuracy(DEFAULT), accuracy("foam", outside=3)]
     text = said(accuracies, times)
-    assert f"is **{DEFAULT}** in float32, 100 ns a matrix at batch 100, 10 times faster than svd." in text
+    assert f": **{DEFAULT}** in float32, 100 ns per matrix at batch 100, 10 times faster than svd." in text
     assert "foam (20 ns, outside on 3)" in faster_outside(Results(accuracies, times, ()), "float32")
 
 
@@ -53,15 +67,15 @@ def test_a_difference_within_the_spread_is_none():
 
 def test_nobody_within_the_contract_is_said():
     text = said([accuracy("svd", 4), accuracy(DEFAULT, 2, 2)], [timing("svd", 110), timing(DEFAULT, 100)])
-    assert f"No method measured keeps the contract on all 10 matrices of mine: {DEFAULT} comes closest" in text
+    assert f"mine (10): none in float32 ({DEFAULT} comes closest, outside on 2)" in text
 
 
 def test_a_report_opens_with_three_sentences():
-    beside = Beside([contender(DEFAULT, 100, 1e-7, is_own=True), contender("other", 500, 1e-6)], [])
-    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], beside=beside)
+    peers = PeerComparison([contender(DEFAULT, 100, 1e-7, is_own=True), contender("other", 500, 1e-6)], [])
+    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], peers=peers)
     assert text.count("\n") == 2
-    assert "for values no peer lies below and left of jaxrot's front" in text
-    assert f"the fastest is other in float32, 5 times the time of {DEFAULT}" in text
+    assert "none beyond jaxrot's front for values" in text
+    assert f"fastest: other in float32, 5 times the time of {DEFAULT}" in text
     assert "gradients" not in text, "there was none"
 
 
@@ -72,8 +86,8 @@ def test_a_report_opens_with_three_sentences():
 def test_a_peer_is_beyond_the_front_where_no_method_is_as_accurate_and_as_fast(time, error, is_beyond):
     contenders = [contender(DEFAULT, 100, 1e-7, is_own=True), contender("peer", time, error)]
     assert [entry.name for entry in beyond_front(contenders, of_gradients=False)] == ["peer"] * is_beyond
-    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], beside=Beside(contenders, []))
-    assert ("**peer in float32 lies beyond jaxrot's front**" in text) == is_beyond
+    text = said([accuracy(DEFAULT)], [timing(DEFAULT, 100)], peers=PeerComparison(contenders, []))
+    assert ("beyond jaxrot's front for values: **peer in float32**" in text) == is_beyond
 
 
 def test_gradients_have_a_front_of_their_own():
@@ -86,7 +100,7 @@ def test_gradients_have_a_front_of_their_own():
 
 
 @pytest.mark.parametrize(
-    ("time", "words"), [(50, "1 iteration of newton in float32, in 0.5 times"), (95, "by the spread")]
+    ("time", "words"), [(50, "newton with iterations=1 in float32, 0.5 times"), (95, "by the spread")]
 )
 def test_a_warm_start_is_called_faster_only_beyond_the_spread(time, words):
     def warm(step, iterations, time, error):
@@ -102,7 +116,7 @@ def test_a_broken_promise_is_said_once(group):
     whole = accuracy(DEFAULT, outside=2, broken=2 if group == "input" else 0)
     part = accuracy(DEFAULT, outside=2, broken=2, set_name="part", group=group)
     text = said([whole, part], [timing(DEFAULT, 100)])
-    assert f"broken inside the declared domain: {DEFAULT} on 2" in text
+    assert f"broken by {DEFAULT} on 2 matrices" in text
 
 
 def test_dtypes_are_compared_at_the_largest_batch_they_share():

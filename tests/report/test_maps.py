@@ -7,9 +7,8 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from jaxrot.report.drawing import figures
-from jaxrot.report.stability import maps
-from jaxrot.report.stability.cells import Cells, ConditionMap, Kind, ScaleMap
+from jaxrot.report.measure.stability import Cells, ConditionMap, Kind, ScaleMap
+from jaxrot.report.show import figures, stability_maps
 
 NOT_A_ROTATION, NOT_FINITE, KEPT = (
     to_rgb(color) for color in (figures.NOT_A_ROTATION, figures.NOT_FINITE, figures.KEPT)
@@ -52,7 +51,7 @@ def where_they_differ(one, other):
 def test_colors_follow_the_excess_and_the_failures_have_their_own(dtype):
     excess = np.array([0, 1, 1.01, 1e2, 1e6, 1e20, 1e20, np.inf])
     kind = np.array([0, 0, 1, 1, 1, 1, Kind.NOT_A_ROTATION, Kind.NOT_FINITE], np.int8)
-    colors = maps.color_cells(Cells(excess, excess, kind), dtype)
+    colors = stability_maps.color_cells(Cells(excess, excess, kind), dtype)
     np.testing.assert_allclose(colors[:2], [KEPT, KEPT])
     np.testing.assert_allclose(colors[6:], [NOT_A_ROTATION, NOT_FINITE])
     luminance = colors @ [0.2126, 0.7152, 0.0722]
@@ -64,7 +63,9 @@ def test_a_failure_is_drawn_in_its_cell_of_its_map():
     # s2 = 1 and s3 = -1 is the lower right corner of a map; three of them in the first row, behind the explanation.
     def picture(kind):
         planted = cells(1e3, kind, at=[4])
-        return pixels(maps.draw_condition_maps(condition_map({"a": cells(), "b": planted, "c": cells()}), ["a", "b"]))
+        return pixels(
+            stability_maps.draw_condition_maps(condition_map({"a": cells(), "b": planted, "c": cells()}), ["a", "b"])
+        )
 
     outside, reflected = picture(Kind.OUTSIDE), picture(Kind.NOT_A_ROTATION)
     top, bottom, left, right = where_they_differ(outside, reflected)
@@ -80,8 +81,8 @@ def test_a_failure_is_drawn_in_its_cell_of_its_map():
 
 def test_every_method_has_a_map_and_the_legend_a_place():
     names = [f"method_{number}" for number in range(10)]
-    few = pixels(maps.draw_condition_maps(condition_map({"method_0": cells()}), ["method_0"]))
-    many = pixels(maps.draw_condition_maps(condition_map({name: cells() for name in names}), names))
+    few = pixels(stability_maps.draw_condition_maps(condition_map({"method_0": cells()}), ["method_0"]))
+    many = pixels(stability_maps.draw_condition_maps(condition_map({name: cells() for name in names}), names))
     assert many.shape[0] > 2 * few.shape[0]
     background = np.all(np.abs(many - KEPT) < 0.01, axis=-1).sum()
     assert background > 8 * np.all(np.abs(few - KEPT) < 0.01, axis=-1).sum()
@@ -91,7 +92,7 @@ def test_a_failure_is_drawn_at_its_scale_and_sign():
     def picture(kind):
         # The last cell: inverted, largest scale. The second method is the lower row of a panel.
         planted = {"a": cells(count=10), "b": cells(1e3, kind, at=[9], count=10)}
-        return pixels(maps.draw_scale_map([scale_map(planted), scale_map(planted, "float64")], ["a", "b"]))
+        return pixels(stability_maps.draw_scale_map([scale_map(planted), scale_map(planted, "float64")], ["a", "b"]))
 
     outside, failed = picture(Kind.OUTSIDE), picture(Kind.NOT_FINITE)
     differing = np.abs(outside - failed).max(-1) > 0.02
@@ -112,11 +113,11 @@ def test_methods_are_sorted_by_what_they_keep_then_by_their_failures():
         "nearly": cells(2, Kind.OUTSIDE, at=[3]),
         "all too": cells(),
     }
-    assert maps.sorted_methods([condition_map(methods)]) == ["all", "all too", "nearly", "wrong", "nan"]
+    assert stability_maps.sorted_methods([condition_map(methods)]) == ["all", "all too", "nearly", "wrong", "nan"]
 
 
 @pytest.mark.parametrize(
     ("share", "words"), [(0, "0 %"), (1e-4, "< 1 %"), (0.5, "50 %"), (0.9999, "> 99 %"), (1, "100 %")]
 )
 def test_all_and_nothing_are_said_only_of_all_and_nothing(share, words):
-    assert maps._percent(share) == words
+    assert stability_maps._percent(share) == words

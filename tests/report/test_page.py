@@ -1,7 +1,7 @@
 import base64
 import html.parser
 
-from jaxrot.report.writing.page import as_page
+from jaxrot.report.show.page import as_page
 
 TEXT = (
     "# Title ‖R‖\n\nA **finding**.\n\n![What is seen](a.png)\n\n| method | ns |\n| :--- | ---: |\n| `foam` | **12** |\n"

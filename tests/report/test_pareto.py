@@ -8,8 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from jaxrot.report.drawing.labels import place_labels
-from jaxrot.report.drawing.pareto import EXACT, PEER, Panel, Point, draw_pareto, pareto_front
+from jaxrot.report.measure.front import EXACT, PEER, Point, pareto_front
+from jaxrot.report.show.labels import place_labels
+from jaxrot.report.show.pareto import Panel, draw_pareto
 
 
 def point(name, time, error):

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from jaxrot.__main__ import main
-from jaxrot.report import command, measurement, sections
-from jaxrot.report.writing import document, records
+from jaxrot.report import command
+from jaxrot.report.data import ReportData
+from jaxrot.report.inputs import Input
+from jaxrot.report.measure.results import Results
+from jaxrot.report.show import document, records
 
 
 def _save_text(path):
@@ -142,7 +145,7 @@ def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, caps
 
 
 def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
-    nothing = sections.Measured(measurement.Results([], [], ()), None, ())
+    nothing = ReportData(given=Input("none", {}), dtypes=(), results=Results([], [], ()))
     monkeypatch.setattr(command, "measure", lambda *arguments: nothing)
     for module, name in (
         (document, "as_report_markdown"), (document, "as_terminal_text"), (records, "as_json"),

@@ -9,7 +9,7 @@ import pytest
 import jaxrot
 from jaxrot.evaluation import reference
 from jaxrot.evaluation.accuracy import run_in_chunks
-from jaxrot.report.stability.cells import Kind, map_conditions, map_scales, summarise_conditions, summarise_scales
+from jaxrot.report.measure.stability import Kind, map_conditions, map_scales, summarise_conditions, summarise_scales
 
 DTYPES = ("float32", "float64")
 STEPS = 8

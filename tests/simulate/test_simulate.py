@@ -76,7 +76,7 @@ def test_a_run_writes_its_files_and_prints_its_health(only_falling, tmp_path, ca
 
 def test_an_interrupted_run_leaves_what_it_had_finished(only_falling, tmp_path, capsys, monkeypatch):
     @contextlib.contextmanager
-    def impatient(steps, interrupts):
+    def impatient(interrupts):
         calls = []
 
         def advance(step):

@@ -1,4 +1,4 @@
-"""What people use today, measured beside jaxrot: one package a file, and their registry."""
+"""Other packages to compare with: one in each file, and their registry."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -8,8 +8,8 @@ from jaxrot.report.peers.peer import Source
 
 PEERS: Mapping[str, Source] = MappingProxyType(
     {
-        "jnp.linalg.svd": Source("with the sign of the last singular vector mended", ("jax",), jax_linalg.svd),
-        "jax polar": Source("jax.scipy.linalg.polar, which knows no reflection", ("jax",), jax_linalg.polar),
+        "jnp.linalg.svd": Source("with the sign of the last singular vector corrected", ("jax",), jax_linalg.svd),
+        "jax polar": Source("jax.scipy.linalg.polar, which may return a reflection", ("jax",), jax_linalg.polar),
         "jnp.linalg.eigh": Source("of Davenport's matrix, 4 by 4", ("jax",), jax_linalg.eigh),
         "SciPy from_matrix": Source(
             "scipy Rotation.from_matrix, for det A > 0 only", ("scipy",), scipy_rotation.from_matrix, 10_000
@@ -31,6 +31,6 @@ PEERS: Mapping[str, Source] = MappingProxyType(
         "C++ torque (paper)": Source(
             "Müller et al. 2016, appendix D, 20 iterations from Quat(A), with Eigen", (), paper_code.torque
         ),
-        "C++ JacobiSVD (Eigen)": Source("Eigen's, with the sign mended", (), paper_code.jacobi_svd),
+        "C++ JacobiSVD (Eigen)": Source("Eigen's, with the sign corrected", (), paper_code.jacobi_svd),
     }
 )

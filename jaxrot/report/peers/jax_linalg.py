@@ -1,4 +1,4 @@
-"""What JAX itself offers: singular values, the polar decomposition, symmetric eigenvectors."""
+"""JAX's own singular value decomposition, polar decomposition and symmetric eigenvectors."""
 
 from collections.abc import Callable
 
@@ -23,7 +23,7 @@ def svd(dtype: str) -> Peer:
 
 
 def polar(dtype: str) -> Peer:
-    """The unitary factor by `jax.scipy.linalg.polar`: a reflection where det A < 0. Its loop has no reverse mode."""
+    """The unitary factor by `jax.scipy.linalg.polar`: a reflection if det A < 0. Its loop has no reverse mode."""
 
     def rotation(matrix: jax.Array) -> jax.Array:
         return jax.vmap(lambda a: jax.scipy.linalg.polar(a)[0])(matrix)
@@ -43,7 +43,7 @@ def eigh(dtype: str) -> Peer:
             [d - b, c + g, f + h, i - a - e],
         ]
         davenport = jnp.stack([jnp.stack(row, -1) for row in rows], -2)
-        # The sums overflow where A is near the largest number, and LAPACK may never return from an infinity.
+        # The sums overflow if A is near the largest number, and LAPACK may never return from an infinity.
         is_finite = jnp.isfinite(davenport).all(axis=(-2, -1), keepdims=True)
         safe = jnp.where(is_finite, davenport, jnp.zeros_like(davenport))
         w, x, y, z = jnp.moveaxis(jnp.linalg.eigh(safe)[1][..., -1], -1, 0)
@@ -52,7 +52,7 @@ def eigh(dtype: str) -> Peer:
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
-        # There the value and, because of the factor A, its derivative are NaN.
+        # After an overflow the value is NaN and, because of the factor A, its derivative too.
         nan = jnp.where(is_finite, jnp.zeros_like(matrix), jnp.full_like(matrix, jnp.nan))
         return jnp.stack([jnp.stack(row, -1) for row in columns], -2) + nan * matrix
 

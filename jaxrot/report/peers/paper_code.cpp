@@ -1,6 +1,6 @@
 // The methods that Müller et al. 2016 compare, for batches: appendix C (Irving et al. 2004) and appendix D (the torque
 // iteration) with the paper's thresholds, which are absolute, and Eigen's singular value decomposition.
-// Matrices are rows of nine numbers. Written anew from the paper's description of its algorithms.
+// Matrices are rows of nine numbers. The code follows the paper's description of its algorithms.
 
 #include <Eigen/Dense>
 #include <cmath>
@@ -15,7 +15,7 @@ template <class T> Matrix<T> read(const T *matrices, long n) { return Eigen::Map
 
 template <class T> void write(T *rotations, long n, const Matrix<T> &r) { Eigen::Map<Rows<T>>(rotations + 9 * n) = r; }
 
-// Zeroes the largest entry beside the diagonal, at most ten times. Returns the eigenvectors; `d` ends diagonal.
+// Zeroes the largest off-diagonal entry, at most ten times. Returns the eigenvectors; `d` ends diagonal.
 template <class T> Matrix<T> eigenvectors(Matrix<T> &d) {
     static const int pairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
     Matrix<T> v = Matrix<T>::Identity();

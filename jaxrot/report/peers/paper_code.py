@@ -1,4 +1,4 @@
-"""The methods of Müller et al. 2016 in C++, as the paper gives them, compiled where a compiler and Eigen are found."""
+"""The methods of Müller et al. 2016 in C++, compiled if a compiler and Eigen are found."""
 
 import ctypes
 import functools
@@ -20,7 +20,7 @@ _ITERATIONS = 20
 
 
 def irving(dtype: str) -> Peer:
-    """Appendix C: the eigenvectors of AᵀA by Jacobi rotations, the sign and small singular values mended."""
+    """Appendix C: the eigenvectors of AᵀA by Jacobi rotations, with the sign and small singular values corrected."""
     return _peer("irving", dtype)
 
 
@@ -30,30 +30,23 @@ def jacobi_svd(dtype: str) -> Peer:
 
 
 def torque(dtype: str) -> Peer:
-    """Appendix D from a cold start: the quaternion that Eigen makes of A, normalised, as section 3 recommends."""
-    library, threads = _library()
-    function = library[f"torque_{dtype}"]
-
-    def value(matrices: np.ndarray) -> np.ndarray:
-        rotations = np.empty_like(matrices)
-        function(_pointer(matrices), None, _pointer(rotations), len(matrices), _ITERATIONS)
-        return rotations
-
-    return Peer(np.ascontiguousarray, value, None, np.asarray, threads, dtype)
+    """Appendix D from a cold start: the normalised quaternion that Eigen makes of A, as section 3 recommends."""
+    refined, threads = refine(dtype)
+    return Peer(np.ascontiguousarray, lambda a: refined(a, None, _ITERATIONS), None, np.asarray, threads, dtype)
 
 
-def refine(dtype: str) -> tuple[Callable[[np.ndarray, np.ndarray, int], np.ndarray], int]:
+def refine(dtype: str) -> tuple[Callable[[np.ndarray, np.ndarray | None, int], np.ndarray], int]:
     """Appendix D from a warm start: (matrices, rotations, iterations) to rotations, and its threads.
 
     Raises:
         UnavailableError: No compiler, no Eigen, or it does not compile.
     """
     library, threads = _library()
-    function = library[f"torque_{dtype}"]
 
-    def refined(matrices: np.ndarray, starts: np.ndarray, iterations: int) -> np.ndarray:
+    def refined(matrices: np.ndarray, starts: np.ndarray | None, iterations: int) -> np.ndarray:
         rotations = np.empty_like(matrices)
-        function(_pointer(matrices), _pointer(starts), _pointer(rotations), len(matrices), iterations)
+        start = None if starts is None else _pointer(starts)
+        library[f"torque_{dtype}"](_pointer(matrices), start, _pointer(rotations), len(matrices), iterations)
         return rotations
 
     return refined, threads
@@ -61,11 +54,10 @@ def refine(dtype: str) -> tuple[Callable[[np.ndarray, np.ndarray, int], np.ndarr
 
 def _peer(name: str, dtype: str) -> Peer:
     library, threads = _library()
-    function = library[f"{name}_{dtype}"]
 
     def value(matrices: np.ndarray) -> np.ndarray:
         rotations = np.empty_like(matrices)
-        function(_pointer(matrices), _pointer(rotations), len(matrices))
+        library[f"{name}_{dtype}"](_pointer(matrices), _pointer(rotations), len(matrices))
         return rotations
 
     return Peer(np.ascontiguousarray, value, None, np.asarray, threads, dtype)
@@ -96,7 +88,7 @@ def _compiled() -> tuple[ctypes.CDLL, int] | str:
         target = Path(place) / "paper_code.so"
         command = [compiler, "-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC", f"-I{folder}"]
         command += [str(_SOURCE), "-o", str(target)]
-        # Not every compiler brings OpenMP; one thread is what is left then.
+        # A compiler without OpenMP compiles for one thread.
         for openmp, threads in ((["-fopenmp"], usable_cores()), ([], 1)):
             done = subprocess.run([*command, *openmp], capture_output=True, text=True, check=False)
             if done.returncode == 0:

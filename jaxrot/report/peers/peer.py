@@ -1,4 +1,4 @@
-"""What a peer is: how to hand it matrices, how to run it, and what to know about it."""
+"""The record of a peer: how to pass matrices to it, how to run it, and what it computes with."""
 
 import importlib.util
 from collections.abc import Callable
@@ -12,42 +12,26 @@ class UnavailableError(Exception):
 
 
 class Peer(NamedTuple):
-    """A peer, ready for one dtype. "Own" arrays are whatever its package computes with, in its memory.
+    """A peer, ready for one dtype. Its own arrays are those of its package, in the memory where it computes."""
 
-    Attributes:
-        load: From (n, 3, 3) NumPy matrices to its own; not timed.
-        value: From its own matrices to its own rotations; returns when they are there.
-        pullback: From its own matrices and cotangents of R to (rotations, cotangents of A); None where it has no
-            derivative.
-        unload: From its own array to NumPy, (n, 3, 3); NaN where it refused a matrix.
-        threads: Threads that compute.
-        computes_in: The dtype it computes in, whatever it is given.
-        accepts: From (n, 3, 3) matrices to whether it takes each; None where it takes all. It is timed on these alone.
-    """
-
-    load: Callable[[np.ndarray], Any]
-    value: Callable[[Any], Any]
+    load: Callable[[np.ndarray], Any]  # From (n, 3, 3) NumPy matrices to its own; not timed
+    value: Callable[[Any], Any]  # From its own matrices to its own rotations; returns when they are there
+    # From its own matrices and cotangents of R to (rotations, cotangents of A); None if it has no derivative.
     pullback: Callable[[Any, Any], tuple[Any, Any]] | None
-    unload: Callable[[Any], np.ndarray]
-    threads: int
-    computes_in: str
+    unload: Callable[[Any], np.ndarray]  # From its own array to NumPy, (n, 3, 3); NaN for a refused matrix
+    threads: int  # Threads that compute
+    computes_in: str  # The dtype it computes in, whatever it is given
+    # From (n, 3, 3) matrices to whether it takes each; None if it takes all. Only accepted matrices are timed.
     accepts: Callable[[np.ndarray], np.ndarray] | None = None
 
 
 class Source(NamedTuple):
-    """Where a peer comes from.
+    """Where a peer comes from."""
 
-    Attributes:
-        description: What it is, for the report.
-        needs: Modules it imports.
-        make: From "float32" or "float64" to the peer; raises `UnavailableError`.
-        largest_batch: Matrices it can be asked for at once without the report taking all day.
-    """
-
-    description: str
-    needs: tuple[str, ...]
-    make: Callable[[str], Peer]
-    largest_batch: int = 100_000
+    description: str  # What it is, for the report
+    needs: tuple[str, ...]  # Modules it imports
+    make: Callable[[str], Peer]  # From "float32" or "float64" to the peer; raises `UnavailableError`
+    largest_batch: int = 100_000  # Matrices it can be asked for at once without the report taking all day
 
 
 def make_peer(source: Source, dtype: str) -> Peer:

@@ -2,22 +2,14 @@
 
 import warnings
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from jaxrot.report.peers.peer import Peer
 
 
-class _Accepted(NamedTuple):
-    """The matrices that SciPy takes, in float64, and where they stood."""
-
-    matrices: np.ndarray
-    places: np.ndarray
-
-
 def from_matrix(dtype: str) -> Peer:
-    """`Rotation.from_matrix`, which orthogonalises, and raises for a whole batch where one determinant is ≤ 0."""
+    """`Rotation.from_matrix`, which orthogonalises, and raises for a whole batch if one determinant is ≤ 0."""
     from scipy.spatial.transform import Rotation
 
     def is_accepted(matrix: np.ndarray) -> bool:
@@ -48,16 +40,16 @@ def align_vectors(dtype: str) -> Peer:
 def _peer(
     dtype: str, rotations: Callable[[np.ndarray], np.ndarray], accepts: Callable[[np.ndarray], np.ndarray]
 ) -> Peer:
-    def load(matrices: np.ndarray) -> _Accepted:
+    def load(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The accepted matrices, and whether each is accepted."""
         places = accepts(matrices)
-        return _Accepted(matrices[places].astype(np.float64), places)
+        return matrices[places].astype(np.float64), places
 
-    def value(accepted: _Accepted) -> tuple[np.ndarray, np.ndarray]:
-        if not len(accepted.matrices):
-            return accepted.matrices, accepted.places
-        # SciPy warns where the rotation is not unique; the report judges that itself.
+    def value(accepted: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        matrices, places = accepted
+        # SciPy warns if the rotation is not unique. The report judges such matrices itself.
         with warnings.catch_warnings(action="ignore"):
-            return rotations(accepted.matrices), accepted.places
+            return rotations(matrices) if len(matrices) else matrices, places
 
     def unload(result: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         found, places = result

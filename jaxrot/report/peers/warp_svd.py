@@ -1,4 +1,4 @@
-"""NVIDIA Warp's `svd3`: on its CPU device, one thread, and on a GPU where there is one."""
+"""NVIDIA Warp's `svd3` on one thread of the CPU, and on a GPU if there is one."""
 
 # pyright: reportInvalidTypeForm=false
 # Warp's kernels state their types as calls, which are no type expressions.
@@ -23,7 +23,7 @@ def on_cuda(dtype: str) -> Peer:
 
 def _peer(device: str, dtype: str) -> Peer:
     wp: Any = importlib.import_module("warp")
-    # Or it greets on stdout, at its first use and at every compilation.
+    # Otherwise Warp prints to standard output at its first use and at every compilation.
     wp.config.quiet, wp.config.log_level = True, wp.LOG_ERROR
     wp.init()
     if device != "cpu" and wp.get_cuda_device_count() == 0:

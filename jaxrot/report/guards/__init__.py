@@ -1,1 +1,0 @@
-"""What every guard of the default method and of the steps costs and prevents."""

@@ -1,0 +1,1 @@
+"""The report as sentences, tables, pictures and files."""
