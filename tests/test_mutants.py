@@ -35,9 +35,9 @@ MUTANTS = {
         ("test_derivative.py::test_the_jacobian_is_finite_and_bounded_on_every_family[float64-forward]",),
     ),
     "missing scale guard": Mutant(
-        "solvers/singular_pair.py",
-        'if "scale" not in without:',
-        'if "scale" in without:',
+        "_nearest.py",
+        "solve(scaled(mat3.components(matrix)))",
+        "solve(mat3.components(matrix))",
         ("test_methods.py::test_a_method_keeps_its_promise_on_every_family[singular_pair-jit-float64]",),
     ),
     "the angle the wrong way round": Mutant(
