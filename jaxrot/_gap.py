@@ -17,8 +17,8 @@ def rotation_gap(matrix: ArrayLike) -> jax.Array:
     """Returns the relative gap (s2+s3)/s1: how well a 3×3 matrix determines its nearest rotation.
 
     s1 ≥ s2 ≥ |s3| are the signed singular values. The gap is 0 where the nearest rotation is not unique, and 2 for a
-    multiple of a rotation. It is one over the condition number κ = s1/(s2+s3): an error of Frobenius norm ε s1 in A
-    changes R by up to 2 ε κ.
+    multiple of a rotation. It is 1/κ, where κ = s1/(s2+s3) is the sensitivity of R to A (half its condition number): an
+    error of Frobenius norm ε s1 in A changes R by up to 2 ε κ.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.

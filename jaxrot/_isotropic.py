@@ -43,9 +43,9 @@ def isotropic_energy(matrix: ArrayLike, energy: Callable[[jax.Array], jax.Array]
 
     Derivative:
         The gradient is U diag(∂ψ) Vᵀ. The Hessian is exact at equal, nearly equal, zero and negative singular values if
-        ψ is smooth there as a function of A. It is damped as for `nearest_rotation` where ψ is not smooth: at
-        s2 + s3 = 0, for a ψ that changes if two arguments change their signs. Third derivatives are damped at equal
-        singular values.
+        ψ is smooth there as a function of A. If ψ changes when two arguments change their signs, it is not smooth at
+        s2+s3 = 0; the Hessian is damped there as in `nearest_rotation`. Third derivatives are damped at equal singular
+        values.
 
     Accuracy:
         Gradient 64 eps, Hessian 1,024 eps, relative to the norms of the derivatives of this and of the next order.

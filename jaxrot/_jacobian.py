@@ -45,7 +45,7 @@ def rotation_jacobian(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, dampin
         damping: Relative damping of H⁻¹, as for `nearest_rotation`. Static.
 
     Returns:
-        J, shape (..., 9, 9), dtype of `matrix`, in one over its unit. J is exactly symmetric, and inf where it exceeds
+        J, shape (..., 9, 9), dtype of `matrix`, in the unit of 1/A. J is exactly symmetric, and inf where it exceeds
         the dtype. Accuracy and damping are those of the derivative of `nearest_rotation`.
 
     Raises:
@@ -84,8 +84,8 @@ def twist_modes(matrix: ArrayLike) -> TwistModes:
         matrix: A, real, shape (..., 3, 3), any scale.
 
     Returns:
-        (eigenvalues, modes). A change of A along a mode turns R at the rate 2/(sᵢ+sⱼ), sᵢ the signed singular values,
-        in one over the unit of A. It is damped to 0 if sᵢ+sⱼ is below about 64 eps tr S. NaN or inf in A gives NaN.
+        (eigenvalues, modes). A change of A along a mode changes R along that mode, 2/(sᵢ+sⱼ) times as much, sᵢ the
+        signed singular values. It is damped to 0 if sᵢ+sⱼ is below about 64 eps (s1+s2+s3). NaN or inf gives NaN.
 
     Raises:
         ValueError: Wrong shape.

@@ -24,7 +24,7 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
         matrix: A, real, shape (..., 3, 3), any scale. Half precision is computed in float32, integers in the default
             floating dtype, float64 in float32 unless x64 is on. Subnormal entries count as 0.
         method: A name in `METHODS`. Static.
-        damping: Relative damping δ/tr(RᵀA) ≥ 0 of the derivative alone, whose norm is then at most 1/δ. Static.
+        damping: d ≥ 0. Bounds the norm of the derivative by 1/(d·tr(RᵀA)); R does not change. Static.
 
     Returns:
         R, shape (..., 3, 3), dtype of `matrix`. NaN for a matrix with NaN or inf; the others are not affected.
@@ -38,13 +38,13 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
         tr(RᵀA), always the same in one compiled program; another program may return another.
 
     Derivative:
-        That of the nearest rotation, also for approximate methods, forward and reverse, to any order. Exact at equal
-        singular values. Finite for every finite matrix: it tends to 0 along an axis whose gap sᵢ+sⱼ is below about
-        64 eps·tr(RᵀA), and saturates where it would overflow.
+        One rule for all methods, in forward and reverse mode, to any order. Exact at equal singular values. Finite for
+        every finite matrix: it tends to 0 along an axis whose gap sᵢ+sⱼ is below about 64 eps·tr(RᵀA), and stays at a
+        large finite value where it would overflow.
 
     Accuracy:
-        Default method, κ = s1/(s2+s3) < 1/(8 eps), eps of the computing dtype: the error is at most 8 eps (1+κ),
-        ‖RᵀR − 1‖_F at most 10 eps.
+        Default method, κ = s1/(s2+s3) < 1/(8 eps), eps of the computing dtype: ‖R − R*‖_F is at most 8 eps (1+κ) for
+        the exact R*, ‖RᵀR − 1‖_F at most 10 eps.
 
     Example:
         >>> import jax.numpy as jnp, jaxrot
@@ -76,8 +76,8 @@ def nearest_quaternion_wxyz(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, 
         TypeError: Complex or non-numeric matrix, traced method or damping, float64 on a TPU.
 
     Uniqueness:
-        q and −q are the same rotation; the sign with w ≥ 0 is returned. At a half turn w is 0. There the largest
-        component is positive, and q jumps.
+        q and −q are the same rotation; the sign with w ≥ 0 is returned. At a half turn w is 0. There the component of
+        largest modulus is positive, and q jumps.
 
     Derivative:
         As for `nearest_rotation`. At a half turn it is that of the returned side of the jump.

@@ -48,13 +48,13 @@ def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> P
         TypeError: Complex or non-numeric matrix, traced method.
 
     Uniqueness:
-        R and S are unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|, the eigenvalues of S. These are
-        always unique. Where s3 ≥ 0, S is the square root of AᵀA, which is unique even if R is not.
+        R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|, the always unique eigenvalues of S.
+        If s3 ≥ 0, S is the square root of AᵀA, unique even if R is not. If s3 < 0, S is unique iff R is.
 
     Derivative:
-        For R as for `nearest_rotation`; Ṡ = RᵀȦ − [ω]× S. To any order, exact at equal singular values. Along an axis
-        of R whose gap sᵢ+sⱼ is not resolved ω is damped to 0, in both. Ṡ does not depend on the scale of A, and is at
-        most a few κ = s1/(s2+s3) times Ȧ.
+        R as in `nearest_rotation`, Ṙ = R[ω]×, and Ṡ = RᵀȦ − [ω]× S. To any order, exact at equal singular values. Both
+        use the same ω. It is damped to 0 about an axis whose gap sᵢ+sⱼ is below about 64 eps tr S. Ṡ does not depend on
+        the scale of A, and is at most a few κ = s1/(s2+s3) times Ȧ.
 
     Accuracy:
         A = R S to 32 eps s1 by the default method, if 32 eps s1 is a normal number.

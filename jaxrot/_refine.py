@@ -23,8 +23,8 @@ from jaxrot.steps.iteration import iterate
 # iterations. If the iteration stops early it is not the derivative of the result.
 #
 # "unrolled" is right wherever the iteration stops, for example in a simulation that is differentiated through its warm
-# starts. It is not saturated as the rule is: it overflows at the ends of the dtype's range, and that of `torque` where
-# tr(RᵀA) is 0 to the last digit.
+# starts. Unlike the rule it is not saturated: it overflows at the ends of the dtype's range. For `torque` it also
+# overflows if tr(RᵀA) is 0 up to rounding.
 _DERIVATIVES = {"implicit": "the nearest rotation, by its rule", "unrolled": "the iterations that are run"}
 
 
@@ -43,10 +43,10 @@ def refine_rotation(
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
-        rotation: The start, shape (..., 3, 3), times any factor but 0. The batch axes broadcast.
+        rotation: The start, shape (..., 3, 3), times any positive factor. The batch axes broadcast.
         step: A name in `STEPS`. Static.
         iterations: Number of steps, ≥ 0. Static.
-        escape: Leave a start that is an equilibrium but not nearest. Static.
+        escape: Leave a start that no step would move although it is not nearest. Static.
         derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:
@@ -58,16 +58,16 @@ def refine_rotation(
 
     Uniqueness:
         The start decides what A leaves undetermined: everything for A = 0, the angle about the free axis for rank 1
-        (with `quest` to √eps). A start that is not nearest but has zero torque, exactly half a turn off, is returned
-        unless `escape` is on.
+        (with `quest` to √eps). A start Q with zero torque, QᵀA = AᵀQ, is returned even if it is not nearest (exactly
+        half a turn off), unless `escape` is on.
 
     Derivative:
         `"implicit"`: that of `nearest_rotation`, and 0 with respect to the start. Right at convergence, to any order.
         `"unrolled"`: that of the steps, with respect to both. Right before convergence too; may overflow.
 
     Accuracy:
-        `newton` converges cubically from any start, `cayley` from within 90°. `torque` and `torque_exact_angle`
-        converge linearly. `quest` needs one step, except near a half turn.
+        `newton` converges cubically from any start with torque, `cayley` from within 90°. `torque` and
+        `torque_exact_angle` converge linearly. `quest` needs one step, except near a half turn.
 
     Cost:
         `escape` costs about one step. Unrolled reverse mode takes time and memory for every step.
@@ -103,7 +103,7 @@ def refine_quaternion_wxyz(
         quaternion_wxyz: The start, shape (..., 4), any length but 0. The batch axes broadcast.
         step: A name in `STEPS`. Static.
         iterations: Number of steps, ≥ 0. Static.
-        escape: Leave a start that is an equilibrium but not nearest. Static.
+        escape: Leave a start that no step would move although it is not nearest. Static.
         derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:

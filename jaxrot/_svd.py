@@ -60,7 +60,7 @@ def rotation_variant_svd(matrix: ArrayLike) -> RotationVariantSVD:
 
     Derivative:
         Forward and reverse, to any order, finite for every finite matrix. ṡᵢ = uᵢᵀ Ȧ vᵢ for the returned U and V.
-        The rates of U and V are over sᵢ−sⱼ and sᵢ+sⱼ, and damped to 0 where these are below about 64 eps tr S. So
+        U̇ and V̇ divide by sᵢ−sⱼ and sᵢ+sⱼ, and are damped to 0 if these are below about 64 eps (s1+s2+s3). So
         U diag(φ(s)) Vᵀ and V diag(φ(s)) Vᵀ have a wrong derivative at equal and nearly equal singular values: use
         `isotropic_map` or `polar_decomposition`.
 
@@ -223,7 +223,7 @@ def _reciprocal_gaps_jvp(order: int, primals, tangents):
     delta_dot = resolved_gap(jnp.ones_like(total_dot)) * total_dot
 
     def tangent(inverse: Complex, gap_dot: jax.Array) -> Complex:
-        # Apply half of the gain on each side of the product, as in `_derivative`: reverse mode then meets one half
+        # Apply half of the scale on each side of the product, as in `rule`: reverse mode then meets one half
         # before the square that would overflow.
         return multiply(times(inverse, -after), multiply(inverse, (gap_dot, delta_dot)))
 

@@ -18,9 +18,9 @@ _Tree = TypeVar("_Tree")
 def fusion_barrier(values: _Tree, divisor: jax.Array | None = None) -> _Tree:
     """The values, one array or a tree of them, divided by a divisor and computed once.
 
-    On a CPU each value is a quotient; without a divisor it is divided by a 1 that XLA cannot see through. A kernel of
-    another platform computes each value once by itself. There the values without a divisor stay as they are, and all of
-    them share one reciprocal.
+    On a CPU each value is a quotient; without a divisor it is divided by a 1 that XLA cannot see through. Kernels on
+    other platforms compute each value only once anyway. There the function returns the values unchanged if no divisor
+    is given; otherwise it multiplies all of them by one reciprocal.
     """
     if platform() != "cpu":
         inverse = None if divisor is None else 1 / divisor

@@ -110,7 +110,7 @@ def to_orthonormal(q: Quaternion) -> Mat3:
 
 
 def to_scaled_rotation(q: Quaternion) -> Mat3:
-    """The rotation of a quaternion times its squared length: for what divides last, or not at all."""
+    """The rotation matrix of q times ‖q‖², for callers that divide by ‖q‖² later or not at all."""
     w, x, y, z = q
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
     x2, y2, z2 = x + x, y + y, z + z
@@ -123,7 +123,7 @@ def to_scaled_rotation(q: Quaternion) -> Mat3:
 
 
 def davenport_columns(m: Mat3, shift: jax.Array | float = 1.0) -> Columns:
-    """The columns of shift·1 + N(m), N the 4×4 matrix of Davenport's q-method; for R(q) and 1 they are 4 qᵢ q.
+    """The columns of shift·1 + N(m), N that of Davenport's q-method. For m = R(q) and shift 1 column i is 4 qᵢ q.
 
     Source: Sarabandi et al. 2020, eq. (27), four times.
     """
@@ -186,8 +186,8 @@ def _column_with_largest(columns: Columns, sizes: Quaternion) -> Quaternion:
 def from_rotation(m: Mat3) -> Quaternion:
     """The unit quaternion of a rotation, w ≥ 0.
 
-    The largest of the four columns is at least half as long as the quaternion's square, so that nothing cancels and no
-    root of a difference is taken: finite in value and derivative at every rotation, half turns included.
+    Column i is 4 qᵢ q, and the largest |qᵢ| is at least ½, so the chosen column has length 2 or more. Nothing cancels,
+    and no root of a difference is taken: finite in value and derivative at every rotation, including half turns.
 
     Source: Shepperd 1978; Markley, "Unit quaternion from rotation matrix", 2008.
     """

@@ -33,20 +33,20 @@ def power_of_two_factor(magnitude: jax.Array) -> jax.Array:
 
 
 def scaled(m: _Tree) -> _Tree:
-    """The entries of a matrix or quaternion times the power of two that brings the largest one into [2, 4).
+    """Multiplies a matrix or quaternion by the power of two that brings its largest absolute entry into [2, 4).
 
     An infinite entry becomes NaN, and zeros stay zero. Scaling by a power of two is exact: R(2ᵏA) = R(A) bit for
-    bit. The power is made of bits. A quotient would not do: accelerators round it, and flush the reciprocal of a number
-    above 2¹²⁶ to 0.
+    bit. The power is built from the exponent bits. A division would be rounded on accelerators, and they flush the
+    reciprocal of a number above 2¹²⁶ to 0.
     """
     factor = power_of_two_factor(_size(m))
     return jax.tree.map(lambda entry: entry * factor, m)
 
 
 def unscaled(values: _Tree, m: object) -> _Tree:
-    """Values in the unit of `scaled(m)`, in the unit of m again."""
+    """Undoes `scaled(m)`: divides the values by the power of two that `scaled` multiplies m by."""
     size = _size(m)
-    # One over the factor is half of this power. Of the smallest matrices that is no normal number, but the power is.
+    # 1/factor is half of this power. For the smallest matrices 1/factor is subnormal, but the power is normal.
     power = lax.bitcast_convert_type(_exponent(size)[0], size.dtype)
     return jax.tree.map(lambda value: (value * 0.5) * power, values)
 

@@ -25,8 +25,8 @@ def saturate(factor: jax.Array, norm: jax.Array, order: int) -> jax.Array:
     """Returns the factor, saturated where a derivative up to this order would overflow.
 
     The n-th derivative grows like factorⁿ·norm²ⁿ⁻¹, because each further derivative has the linear map on both sides.
-    Where the dtype cannot represent it, the product of the gains and norms is kept constant. A margin of 2¹² for each
-    order covers the number of terms.
+    If the dtype cannot represent it, the returned factor is reduced until the product of factors and norms fits. A
+    margin of 2¹² for each order allows for the sum of many terms.
 
     Args:
         factor: The power of two that normalises A, or 0. Not differentiated.

@@ -1,11 +1,11 @@
 """The one derivative rule of the nearest rotation, whatever algorithm found it.
 
 With S = RᵀA and H = tr(S)·1 − S the tangent is Ṙ = R[ω]×, ω = H⁻¹ vee(RᵀȦ − ȦᵀR): the symmetry of S, differentiated.
-H has the eigenvalues s1+s2, s1+s3, s2+s3, sums of singular values and never differences, so that nothing is singular at
-equal ones. Differentiating U and V of a singular value decomposition instead divides by differences (jax#2311).
+The eigenvalues of H are sums of singular values, s1+s2, s1+s3 and s2+s3. So nothing is singular at equal ones. The
+derivative of U and V of a singular value decomposition divides by differences instead (jax#2311).
 
-Where s2+s3 is not resolved, H⁻¹ is replaced by H(H²+δ²)⁻¹ = Re (H+iδ)⁻¹ with δ = 64 eps·tr S: equal to H⁻¹ along every
-resolved axis, 0 along an axis without a gap, at most 1/(2δ) anywhere.
+H⁻¹ is always computed as H(H²+δ²)⁻¹ = Re (H+iδ)⁻¹, with δ = 64 eps·tr S, or more by `damping`. It equals H⁻¹ along axes
+whose gap is much larger than δ, tends to 0 along an axis whose gap tends to 0, and is at most 1/(2δ) anywhere.
 """
 
 import functools
@@ -20,8 +20,8 @@ from jaxrot._algebra.fusion import fusion_barrier
 from jaxrot._algebra.mat3 import Mat3, Vec3
 from jaxrot._derivative.overflow import apply_scaled, normalising_factor, saturate, split_scale
 
-# The damping that separates an axis from one that rounding made, in units of eps·tr S. With it the rule is within
-# 32 eps κ of the exact derivative up to κ = 1/(128 eps), where the damping itself takes 0.2 of the 0.25 allowed.
+# The smallest damping δ, in units of eps·tr S: a gap well below it counts as rounding. The relative error of the rule
+# is at most 32 eps κ up to κ = 1/(128 eps). There that bound is 0.25, and the damping alone causes 0.2.
 _RESOLVED = 64
 
 
@@ -41,7 +41,7 @@ def angular_tangent(matrix: Mat3, rotation: Mat3, matrix_dot: Mat3, *, damping: 
         matrix: A, any scale.
         rotation: R, the nearest rotation of A.
         matrix_dot: Ȧ.
-        damping: δ/tr S where that is more than the 64 eps that are always there.
+        damping: δ/tr S. A value below 64 eps counts as 64 eps.
         order: How many derivatives have been taken before this one. It only decides where saturation begins, see
             `overflow.saturate`.
 
@@ -72,7 +72,7 @@ def inverse_gap_matrix(matrix: Mat3, rotation: Mat3, *, damping: float = 0.0) ->
 
 
 class _InverseGaps(NamedTuple):
-    """What the rule needs: (H+iδ)⁻¹ = `inverse` − i·`unresolved`, its norm and the stretch S, all of A·`factor`."""
+    """(H+iδ)⁻¹ = `inverse` − i·`unresolved`, about its norm, and the stretch S, all for the normalised A·`factor`."""
 
     inverse: Mat3
     unresolved: Mat3
@@ -83,7 +83,7 @@ class _InverseGaps(NamedTuple):
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3))
 def _inverse_gaps(matrix: Mat3, rotation: Mat3, damping: float, order: int) -> _InverseGaps:
-    """A function of A alone: R's tangent is part of its rule. `order`: that of its derivative, see `saturate`."""
+    """Differentiated with respect to A only: its rule includes the tangent of R. `order` is as in `saturate`."""
     factor = normalising_factor(matrix)
     stretch = mat3.transpose_multiply(rotation, mat3.scale(matrix, factor))
     # Without the barrier XLA:CPU computes the stretch again for each entry of the inverse: the reverse mode then takes
@@ -98,8 +98,8 @@ def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
     (matrix, rotation), (matrix_dot, _) = primals, tangents
     gaps = _inverse_gaps(matrix, rotation, damping, order + 1)
     stretch_dot = stretch_tangent(matrix, rotation, matrix_dot, order=order)
-    # Half of the gain on either side of the product: reverse mode meets each factor first in one of its terms, and all
-    # of the gain on one side comes too late for another.
+    # Apply half of the scale before the product and half after it. Reverse mode visits the factors in the opposite
+    # order; with all of the scale on one side an intermediate value overflows.
     scale = saturate(gaps.factor, gaps.norm, order)
     before, after = split_scale(scale)
     halved_dot = mat3.scale(stretch_dot, before)
@@ -125,8 +125,8 @@ def _inverse_gaps_jvp(damping: float, order: int, primals, tangents):
 def damped_inverse(h: Mat3, delta: jax.Array) -> tuple[Mat3, Mat3, jax.Array]:
     """H(H²+δ²)⁻¹ and δ(H²+δ²)⁻¹, the parts of (H+iδ)⁻¹, and about its largest singular value.
 
-    By LDLᵀ of the complex symmetric H+iδ. Its real and imaginary parts are both semidefinite, so that nothing need be
-    exchanged (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts",
+    By LDLᵀ of the complex symmetric H+iδ. Its real and imaginary parts are both semidefinite, so no pivoting is
+    needed (Higham, "Factorizing complex symmetric matrices with positive definite real and imaginary parts",
     1998). The closed form through the adjugate is shorter and loses eps κ² where two gaps are small (near −R): the
     Jacobian was off by 7e3 eps κ there, with LDLᵀ by a few eps κ.
 

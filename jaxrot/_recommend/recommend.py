@@ -23,8 +23,8 @@ def recommend(
     """Returns the fastest method that finds the nearest rotations of these matrices to a tolerance, by measurement.
 
     Args:
-        matrices: A, real, shape (..., 3, 3), any scale: matrices like those to come. Of more than 10,000 a random
-            sample is measured, with the 100 largest κ = s1/(s2+s3) and the 100 smallest s3/s1 in it.
+        matrices: A, real, shape (..., 3, 3), any scale: matrices like those to come. If there are more than 10,000, a
+            random sample is measured, with the 100 largest κ = s1/(s2+s3) and the 100 smallest s3/s1 in it.
         tolerance: The largest acceptable error ‖R − R*‖_F, > 0, R* the nearest rotation; about √2 times an angle in
             radians.
         previous: Rotations to start from, broadcast against `matrices`. With them the steps of `refine_rotation` are
@@ -32,17 +32,17 @@ def recommend(
         dtype: float32 or float64; by default that of `matrices`. Half precision is measured in float32, unrounded.
 
     Returns:
-        The fastest candidate whose error on the sample is at most tolerance / 2. Among those whose median time is
-        within its upper quartile, the most accurate one. If no candidate is accurate enough, `meets` is False, and the
-        most accurate candidate is returned.
+        The fastest candidate whose error on the sample is at most tolerance / 2. Candidates are equally fast if their
+        median time is below the fastest one's upper quartile; of these the most accurate is returned. If none is
+        accurate enough, `meets` is False, and the most accurate one is returned.
 
     Raises:
-        ValueError: Wrong shape, no finite matrix, tolerance not positive, `previous` no rotations, unusable dtype.
+        ValueError: Wrong shape, no finite matrix, tolerance not positive, `previous` not rotations, unusable dtype.
         TypeError: Complex, non-numeric or traced arrays; tolerance or dtype of the wrong type.
 
     Accuracy:
-        A method is excluded if any finite input lies outside the domain it declares in `METHODS`. Where R* is not
-        determined, κ ≥ 1/(8 eps), the lost trace tr(RᵀA) is judged instead of the error.
+        A method is excluded if any finite input lies outside the domain it declares in `METHODS`. If κ ≥ 1/(8 eps), R*
+        is not determined; then the lost trace tr(R*ᵀA) − tr(RᵀA) is judged instead of the error.
 
     Cost:
         Some seconds to half a minute: up to twenty programs are compiled and run. Call it once, outside `jit`.

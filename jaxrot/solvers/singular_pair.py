@@ -24,12 +24,12 @@ def solve(a: Mat3) -> Mat3:
 
     R maps each right singular vector to its left one. One pair is enough: only the angle about it is then missing.
 
-    1. n, the singular vector whose eigenvalue of AᵀA is separated: the largest or the smallest, whichever is further
-       from the middle one. It is a column of an adjugate: the one that cannot vanish.
-    2. u = R n: A n where n belongs to the largest singular value, else cof(A) n. The sign of det A takes no part.
-    3. Two reflections, of n and of u onto the third axis, that of u to its own side.
+    1. n, the right singular vector with the better separated eigenvalue λ of AᵀA: the largest or the smallest,
+       whichever is further from the middle one. n is the column of the adjugate of AᵀA − λ·1 that cannot vanish.
+    2. u = R n up to length: A n if n belongs to the largest singular value, else cof(A) n, for either sign of det A.
+    3. Two reflections (half turns, as quaternions) take n to e₃, and u to e₃ or −e₃, whichever is nearer.
     4. The angle about n that makes tr(RᵀA) largest, and R's quaternion from the two reflections and the angle.
-    5. Where A is a rotation to √eps times a power of two, A itself goes on, so that repeated repairs do not drift.
+    5. If A/2ᵏ is a rotation up to √eps for some k, it replaces R, so that repeated repairs do not drift.
     6. One Newton–Schulz step.
 
     Rounding of AᵀA, eps s1², tilts v1 towards vⱼ by eps s1²/(s1² − sⱼ²), and R by that times (s1 − sⱼ)/s1, which is
@@ -96,15 +96,15 @@ def outer_eigenvalue(gram: Deviator) -> jax.Array:
 
 
 def eigenvector(gram: Deviator, eigenvalue: jax.Array, *, is_chosen: bool = True) -> tuple[jax.Array, jax.Array]:
-    """The x and y with n + e₃‖n‖ and (x, y, 1) parallel, n the eigenvector of a separated eigenvalue; e₃ is that of 0.
+    """Returns x, y with (x, y, 1) parallel to n + e₃‖n‖, n the eigenvector of a separated eigenvalue (e₃ if gram is 0).
 
-    n is a column of the adjugate of what is singular, the one with the largest entry on the diagonal: nothing cancels,
-    and n is nowhere near −e₃.
+    n is a column of the adjugate of gram − eigenvalue·1: the one with the largest diagonal entry. So nothing cancels,
+    and n is far from −e₃.
 
     Args:
         gram: The deviator.
-        eigenvalue: One whose distance from the other two is of their size.
-        is_chosen: Whether the column is chosen; without that it is the third one, which may be 0.
+        eigenvalue: A separated one: its distance from the other two is comparable with their size.
+        is_chosen: True takes the column that cannot vanish; False always takes the third one, which may be 0.
     """
     (xx, yy, zz), (yz, xz, xy), *_ = gram
     xx, yy, zz = xx - eigenvalue, yy - eigenvalue, zz - eigenvalue
@@ -200,9 +200,9 @@ def composed(m: tuple[jax.Array, jax.Array], axis: Vec3, cosine: jax.Array, sine
 
 
 def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kept: bool = True) -> Mat3:
-    """The matrix of q, orthogonal to some eps; A over its power of two where that is a rotation to √eps.
+    """The matrix of q, orthogonal to a few eps; or A divided by its power of two, if that is a rotation up to √eps.
 
-    A rotation has been scaled by 2 or by 4: AᵀA is 4 or 16 times the identity and the trace 6 or 12, that of −R 2 or 4.
+    A scaled rotation is 2 or 4 times a rotation: AᵀA is 4 or 16 times 1, and tr(RᵀA) is 6 or 12. For −R it is 2 or 4.
     """
     r, norm = quaternion.to_scaled_rotation(q), quaternion.squared_norm(q)
     if is_kept:
@@ -210,7 +210,7 @@ def rotation(a: Mat3, q: Quaternion, gram: Deviator, trace: jax.Array, *, is_kep
         power = 2 + (is_large + is_large)
         off = gram.xx - power * power
         is_rotation = (gram.p * gram.p + off * off < 4 * float(jnp.finfo(norm.dtype).eps)) & (trace > 2 * power)
-        # The choice goes with the divisor, as its sign.
+        # The sign of the divisor encodes the choice, so that XLA computes the choice only once.
         norm = fusion_barrier(jnp.where(is_rotation, -power, norm))
         r = mat3.where(norm < 0, a, r)
         norm = jnp.abs(norm)
