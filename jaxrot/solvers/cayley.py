@@ -10,14 +10,14 @@ from jaxrot._algebra.scaling import safe_sqrt, unit_scaled
 def solve(a: Mat3) -> Mat3:
     """An approximation of the nearest rotation: always a rotation.
 
-    The i-th column of 1 + N(A) has, for a rotation, the length 4|qᵢ|; the signs are those of the longest column.
+    For a rotation column i of 1 + N(A) has the length 4|qᵢ|. The signs are those of the longest column.
 
     Returns:
         Rotations, exact for multiples of a rotation.
 
     Cost: about 130 flops and five square roots.
-    Source: Sarabandi et al. 2020, eq. (31) and Table I; Sarabandi, Pérez-Gracia and Thomas 2019. The scale, which the
-    formula takes to be 1, is removed first; sign(0) counts as +1.
+    Source: Sarabandi et al. 2020, eq. (31) and Table I; Sarabandi, Pérez-Gracia and Thomas 2019. The formula
+    assumes the scale 1; the scale is removed first. sign(0) counts as +1.
     """
     columns = quaternion.davenport_columns(unit_scaled(a))
     signs, lengths_squared = quaternion.longest(columns)

@@ -8,8 +8,8 @@ from jaxrot._algebra import mat3
 from jaxrot._algebra.mat3 import Mat3
 from jaxrot._algebra.scaling import safe_divide, unit_scaled
 
-# Newton's method descends from the upper bound; at the double root, s2+s3 → 0, it only halves its distance, and the
-# counts are where rounding stops it.
+# Newton's method descends from the upper bound. At the double root, s2+s3 → 0, each step only halves the distance, and
+# rounding stops it after these counts.
 _NEWTON_STEPS = {"float32": 14, "float64": 28}
 
 

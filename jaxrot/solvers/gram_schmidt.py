@@ -10,8 +10,8 @@ def solve(a: Mat3) -> Mat3:
     """A rotation, not the nearest one: the columns made orthonormal in the order 0, 1, 2.
 
     Returns:
-        Rotations whatever the sign of det A: the last column of A has no influence. NaN where the first
-        is zero or the second parallel to it.
+        Rotations for either sign of det A, because the last column of A has no influence. NaN if the first column is
+        zero, or if the second is parallel to it.
 
     Cost: 54 flops, two square roots, two divisions.
     Source: Müller et al. 2016, section 2; Sarabandi et al. 2020, section I.

@@ -6,19 +6,19 @@ from jax import lax
 from jaxrot._algebra import mat3
 from jaxrot._algebra.mat3 import Mat3
 
-# With 6 nothing was left to gain on 3e5 matrices of any s1/s3.
+# More than 6 iterations did not improve any of 3e5 matrices of any s1/s3.
 _ITERATIONS = {"float32": 7, "float64": 8}
 
 
 def solve(a: Mat3) -> Mat3:
     """The nearest rotation of a matrix with det A > 0, by R ← ½ (γ R + R⁻ᵀ/γ) from R = A.
 
-    Every singular value x becomes ½ (γ x + 1/(γ x)), which doubles its correct digits; γ = (‖R⁻¹‖/‖R‖)^½ makes their
-    spread small first. For det A < 0 the limit is the nearest *reflection*, for det A = 0 NaN.
+    Each step maps a singular value x to ½ (γ x + 1/(γ x)), which doubles its correct digits. γ = (‖R⁻¹‖/‖R‖)^½ reduces
+    the spread of the singular values first. For det A < 0 the limit is the nearest *reflection*, for det A = 0 NaN.
 
     Returns:
-        (..., 3, 3), to rounding while s2 s3 > eps s1², whatever κ. Beyond that the determinant is rounding, and with it
-        the choice between rotation and reflection.
+        Rotations, accurate up to rounding while s2 s3 > eps s1², whatever κ. Beyond that the determinant is rounding.
+        Its sign decides between rotation and reflection.
 
     Cost: 95 flops, two square roots and three divisions a step.
     Source: Higham 1986; Müller et al. 2016, section 2, which prints it without the scaling.

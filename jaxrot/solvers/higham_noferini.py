@@ -10,27 +10,27 @@ from jaxrot._algebra.scaling import safe_divide, unit_scaled
 from jaxrot._algebra.select import constant_like
 from jaxrot.solvers.foam import largest_root
 
-# One iteration multiplies what is wrong with the eigenvector by the error of the eigenvalue over its gap.
+# Each iteration multiplies the error of the eigenvector by the error of the eigenvalue over its gap.
 _INVERSE_ITERATIONS = 2
 
-# The exchanges of rows and columns that bring the largest pivot up: three candidates, then two, then one.
+# The exchanges of rows and columns that bring the largest pivot to the top: three candidates, then two, then one.
 _ORDER = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
 def solve(a: Mat3) -> Mat3:
     """The rotation of the eigenvector of Davenport's N(A) for its largest eigenvalue f.
 
-    f comes from Newton's method on the quartic; f·1 − N = P L D Lᵀ Pᵀ with diagonal pivoting; the start P L⁻ᵀ e₄ is
-    already the eigenvector where f is exact, and inverse iteration makes up for an f that is not.
+    Newton's method on the quartic gives f. f·1 − N = P L D Lᵀ Pᵀ is factorised with diagonal pivoting. If f is exact,
+    the start P L⁻ᵀ e₄ is already the eigenvector. Inverse iteration corrects the error of an inexact f.
 
     Returns:
         Rotations, for det A ≤ 0 too.
 
     Cost: about 550 flops with 14 Newton steps (float32), 720 with 28 (float64), and 30 or 44 divisions.
     Source: Higham and Noferini, "An algorithm to compute the polar decomposition of a 3×3 matrix", 2016: [27] of
-    Sarabandi et al. 2020. The source takes the quartic's closed form where that is well-conditioned and iterates in a
-    two-dimensional subspace where it is not; without branches Newton and single vectors do for both. N itself is
-    theirs, so that its dominant eigenvalue is the algebraically largest.
+    Sarabandi et al. 2020. The source uses the closed form of the quartic if that is well-conditioned. Otherwise it
+    iterates in a two-dimensional subspace. Here Newton's method and single vectors serve both cases, without branches.
+    N is that of the source, so its dominant eigenvalue is the algebraically largest.
     """
     a = unit_scaled(a)
     cofactor = mat3.cofactor(a)
@@ -43,7 +43,7 @@ def null_vector(columns: Columns) -> Quaternion:
     """The eigenvector of a positive semidefinite 4×4 matrix for its eigenvalue next to 0, of any length but 0."""
     m = [list(column) for column in columns]
     trace = m[0][0] + m[1][1] + m[2][2] + m[3][3]
-    # A pivot below it is rounding; 1 where A = 0.
+    # A smaller pivot is rounding. The bound is 1 where A = 0.
     smallest = jnp.where(trace > 0, float(jnp.finfo(trace.dtype).eps) * trace, jnp.ones_like(trace))
     exchanges: list[jax.Array] = []
     for k in range(3):
@@ -54,7 +54,7 @@ def null_vector(columns: Columns) -> Quaternion:
             for row in m:
                 (row[k],), (row[j],) = _exchanged(is_larger, [row[k]], [row[j]])
         for i in range(k + 1, 4):
-            # Where the pivot is 0 so is its column, to rounding.
+            # If the pivot is 0, its column is 0 up to rounding.
             factor = safe_divide(m[i][k], m[k][k])
             for j in range(k + 1, 4):
                 m[i][j] = m[i][j] - factor * m[k][j]
@@ -64,7 +64,7 @@ def null_vector(columns: Columns) -> Quaternion:
     x = _backward(m, [zero, zero, zero, one])
     for _ in range(_INVERSE_ITERATIONS):
         x = _forward(m, x)
-        # Times the last pivot, the smallest one: the length does not matter, and may not overflow.
+        # Multiply by the last and smallest pivot: the length does not matter, but it must not overflow.
         x = _backward(m, [value * (pivots[3] / pivot) for value, pivot in zip(x, pivots, strict=True)])
     for (k, j), is_larger in reversed(list(zip(_ORDER, exchanges, strict=True))):
         (x[k],), (x[j],) = _exchanged(is_larger, [x[k]], [x[j]])

@@ -14,8 +14,8 @@ def solve(a: Mat3) -> Mat3:
     The eigenvector is the largest column of adj(f·1 − N), of the Davenport matrix of f and A.
 
     Returns:
-        Rotations, for det A ≤ 0 too; the identity for A = 0. The root loses digits as it becomes double,
-        s2+s3 → 0, and the adjugate where two gaps are small, near −R.
+        Rotations, for det A ≤ 0 too; the identity for A = 0. The root loses digits as it becomes double, s2+s3 → 0. The
+        adjugate loses digits where two gaps are small, near −R.
 
     Cost: about 430 flops, six square roots, an arc tangent, a sine and a cosine.
     Source: Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987: [25] of Sarabandi et al.
@@ -30,8 +30,8 @@ def solve(a: Mat3) -> Mat3:
 def quartic_root(a: Mat3) -> jax.Array:
     """The largest root f = s1+s2+s3 of (f²−I)² − 8Jf − 4‖cof A‖² by Euler's formula √z1 + √z2 ± √z3.
 
-    The z are the roots of its resolvent cubic, here the eigenvalues of AᵀA; the last term is J/√(z1 z2), which has the
-    sign it must have and does not take the root of a number that rounding has made.
+    The z are the roots of its resolvent cubic, here the eigenvalues of AᵀA. The last term is computed as J/√(z1 z2).
+    That has the right sign, and takes no root of a rounded difference.
     """
     z1, z2, _ = smith_eigenvalues(mat3.transpose_multiply(a, a))
     s1, s2 = safe_sqrt(z1), safe_sqrt(z2)

@@ -11,7 +11,7 @@ from jaxrot._algebra.jacobi import givens, rotate, rotate_rows
 from jaxrot._algebra.mat3 import Mat3, Vec3
 from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 
-# One more than was needed for 8 eps (1+κ) on 4e4 matrices of all families; with two fewer 5 in 1e4 fail.
+# One more than 4e4 matrices of all families needed for 8 eps (1+κ). With two fewer 5 in 1e4 fail.
 _SWEEPS = {"float32": 6, "float64": 7}
 
 
@@ -34,17 +34,17 @@ def solve(a: Mat3) -> Mat3:
     Source: Sarabandi et al. 2020, section V, reference [33]; the determinant is repaired as in `jacobi_svd`.
     """
     left, _, right = decompose(a)
-    # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
+    # Without this step the rounding of some thirty plane rotations adds up to a defect of orthogonality of 42 eps.
     return mat3.newton_schulz(mat3.multiply(left, mat3.transpose(right)))
 
 
 def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     """The decomposition a = left diag(s) rightᵀ with s1 ≥ s2 ≥ |s3|.
 
-    A is made bidiagonal, B; a fixed number of QR sweeps on BᵀB, never formed, drives one of its two entries off the
-    diagonal to zero; what is left is a 2×2 decomposition. What the source decides by branches is decided by selects: a
-    negligible diagonal entry gets the shift zero, with which the next sweep splits it off, and a sweep over a matrix
-    that has already split does nothing.
+    A becomes a bidiagonal matrix B. A fixed number of QR sweeps on BᵀB, which is never formed, drives one of the two
+    off-diagonal entries to zero. A 2×2 decomposition remains. Selects replace the branches of the source: a negligible
+    diagonal entry gets the shift zero, and the next sweep splits it off. A sweep over a matrix that has already split
+    does nothing.
 
     Args:
         a: On components, the largest entry between 2 and 4 or zero (`scaled`).
@@ -56,12 +56,12 @@ def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     Source: Gast, Fu, Jiang and Teran, "Implicit-shifted symmetric QR singular value decomposition of 3×3 matrices",
     2016; Golub and Kahan 1965; the zero shift: Demmel and Kahan 1990.
     """
-    # Beside this an entry is rounding.
+    # A smaller entry is rounding.
     negligible = float(jnp.finfo(a[0][0].dtype).eps) * safe_sqrt(mat3.squared_norm(a))
     state = lax.fori_loop(
         0, _SWEEPS[a[0][0].dtype.name], lambda _, state: _sweep(state, negligible), _bidiagonalised(a)
     )
-    # The second time there is nothing left to do. It makes XLA keep the loop, and so the results, see `ordered_svd`.
+    # The second pass changes nothing. It makes XLA keep the loop, and with it the results; see `ordered_svd`.
     (a0, a1, a2), _, left, right = lax.fori_loop(0, 2, lambda _, state: _last_block(state), state)
     return jacobi.ordered_svd(left, (a0, a1, a2), right)
 
@@ -84,7 +84,7 @@ def _sweep(state: _Bidiagonal, negligible: jax.Array) -> _Bidiagonal:
     (a0, a1, a2), (b0, b1), left, right = state
     smallest = jnp.minimum(jnp.minimum(jnp.abs(a0), jnp.abs(a1)), jnp.abs(a2))
     is_singular = smallest <= negligible
-    # Without a shift the first column of BᵀB is a0 (a0, b0); where a0 = 0 only the direction says where to turn.
+    # Without a shift the first column of BᵀB is a0 (a0, b0). If a0 = 0, only its direction determines the rotation.
     x = jnp.where(is_singular, a0, a0 * a0 - _wilkinson_shift(state))
     y = jnp.where(is_singular, b0, a0 * b0)
 
@@ -103,7 +103,7 @@ def _sweep(state: _Bidiagonal, negligible: jax.Array) -> _Bidiagonal:
     r = givens(a1, bulge)
     (a1, _), (b1, a2) = rotate(r, a1, bulge), rotate(r, b1, a2)
     left = rotate_rows(r, left, 1, 2)
-    # A matrix that has split is left as it is: turns by nothing are not exact, and their rounding adds up.
+    # Leave a matrix that has split unchanged: rotations by 0 are not exact, and their rounding adds up.
     has_split = jnp.minimum(jnp.abs(state.b[0]), jnp.abs(state.b[1])) <= negligible
     swept = _Bidiagonal((a0, a1, a2), (b0, b1), left, right)
     return jax.tree.map(lambda old, new: jnp.where(has_split, old, new), state, swept)
@@ -112,7 +112,7 @@ def _sweep(state: _Bidiagonal, negligible: jax.Array) -> _Bidiagonal:
 def _last_block(state: _Bidiagonal) -> _Bidiagonal:
     """Makes the 2×2 block that is left diagonal; the smaller of b0 and b1 is zero by now.
 
-    Where it is b0 the frame is rolled, so that the full block comes first.
+    If it is b0, the frame is rolled, so that the full block comes first.
     """
     (a0, a1, a2), (b0, b1), left, right = state
     zero = jnp.zeros_like(b0)

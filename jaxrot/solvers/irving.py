@@ -8,30 +8,30 @@ from jaxrot._algebra.mat3 import Mat3, Vec3
 from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 from jaxrot._algebra.select import constant_like
 
-# A singular value below this part of the largest counts as zero. In float32 the paper's 1e-4 lies below the noise,
-# √eps, of the root of an eigenvalue of AᵀA: a plane matrix would be divided by it.
+# A singular value below this fraction of the largest counts as zero. In float32 the paper's 1e-4 is below √eps, the
+# noise of the root of an eigenvalue of AᵀA. With it a matrix of rank 2 would be divided by noise.
 _RANK_TOLERANCE = {"float32": 1e-3, "float64": 1e-4}
 
 
 def solve(a: Mat3) -> Mat3:
     """The rotation U Vᵀ, V the eigenvectors of AᵀA, U = A V diag(1/s), reflected along the smallest s if det U < 0.
 
-    The cases of the source, each by a select: one singular value zero, that column of U is the vector product of the
-    two others; two or three zero, U = 1 and the result is Vᵀ, some rotation.
+    Selects replace the cases of the source. If one singular value is zero, its column of U is the vector product of the
+    other two. If two or three are zero, U = 1 and the result is Vᵀ, some rotation.
 
     Returns:
-        The error grows like eps (s1/s3)², and so does the defect of orthogonality: s is good to eps s1²/s.
+        Rotations. The error and the defect of orthogonality grow like eps (s1/s3)², because s is accurate to eps s1²/s.
         At rank 1 the result is a rotation and not a nearest one.
 
     Cost: about 560 flops, 24 square roots and as many divisions.
-    Source: Irving, Teran and Fedkiw 2004; Müller et al. 2016, appendix C. Its constants 1e-15 and 1e-4 are absolute:
-    here the scale is removed, the first is not needed, and the second is relative to the largest singular value. The
-    determinant of V, which the source tests, is +1 as a product of rotations.
+    Source: Irving, Teran and Fedkiw 2004; Müller et al. 2016, appendix C. Its constants 1e-15 and 1e-4 are absolute.
+    Here the scale is removed: the first is not needed, and the second is relative to the largest singular value. The
+    source tests the determinant of V; here it is +1, because V is a product of rotations.
     """
     eigenvalues, axes = jacobi.symmetric_eigen(mat3.transpose_multiply(a, a))
     s = (safe_sqrt(eigenvalues[0]), safe_sqrt(eigenvalues[1]), safe_sqrt(eigenvalues[2]))
     limit = _RANK_TOLERANCE[a[0][0].dtype.name] * jnp.maximum(jnp.maximum(s[0], s[1]), s[2])
-    # The order is free: the frame is rolled so that the smallest comes last.
+    # The order of the axes is free. Roll the frame until the smallest singular value comes last.
     is_first = (s[0] < s[1]) & (s[0] < s[2])
     is_second = ~is_first & (s[1] < s[2])
     for condition in (is_first | is_second, is_second):

@@ -5,7 +5,7 @@ from jax import lax
 from jaxrot._algebra import jacobi, mat3
 from jaxrot._algebra.mat3 import Mat3, Vec3
 
-# One more than was needed for 8 eps (1+κ) on 4e4 matrices of all families; with two fewer 2 % of them fail.
+# One more than 4e4 matrices of all families needed for 8 eps (1+κ). With two fewer 2 % of them fail.
 _SWEEPS = {"float32": 5, "float64": 6}
 
 
@@ -16,19 +16,19 @@ def solve(a: Mat3) -> Mat3:
         Rotations, for det A ≤ 0 too: the sign is in s3 and never in U or V.
 
     Cost: see `decompose`.
-    Source: Sarabandi et al. 2020, section V, reference [32] (the Jacobi SVD of Eigen); the repair of the determinant is
-    not their (5), diag(1, 1, −1), which is right for sorted singular values and det A < 0 alone.
+    Source: Sarabandi et al. 2020, section V, reference [32] (the Jacobi SVD of Eigen); their
+    repair of the determinant (5), diag(1, 1, −1), is right only for sorted singular values and det A < 0.
     """
     left, _, right = decompose(a)
-    # Without it the rounding of some thirty plane rotations adds up to 42 eps of orthogonality.
+    # Without this step the rounding of some thirty plane rotations adds up to a defect of orthogonality of 42 eps.
     return mat3.newton_schulz(mat3.multiply(left, mat3.transpose(right)))
 
 
 def decompose(a: Mat3) -> tuple[Mat3, Vec3, Mat3]:
     """The decomposition a = left diag(s) rightᵀ with s1 ≥ s2 ≥ |s3|.
 
-    A sweep makes the blocks (0,1), (0,2), (1,2) diagonal in turn, each by one rotation of its rows and one of its
-    columns; the number of sweeps is fixed.
+    A sweep diagonalises the blocks (0,1), (0,2), (1,2) in turn, each by one rotation of its rows and one of its
+    columns. The number of sweeps is fixed.
 
     Args:
         a: On components, the largest entry between 2 and 4 or zero (`scaled`).

@@ -16,8 +16,8 @@ from jaxrot._algebra.select import choose, constant_like, index_of_largest
 def solve(a: Mat3) -> Mat3:
     """An approximation of the nearest rotation: always a rotation, by few multiplications.
 
-    The columns of 1 + N(A) are, for a rotation, multiples of one quaternion; for a noisy one they are averaged after
-    their signs have been made alike.
+    For a rotation the columns of 1 + N(A) are multiples of its quaternion. For a noisy one the columns get equal signs
+    and are then averaged.
 
     Returns:
         Rotations, exact for multiples of a rotation.
@@ -29,22 +29,22 @@ def solve(a: Mat3) -> Mat3:
     columns = quaternion.davenport_columns(unit_scaled(a))
     index = index_of_largest(tuple(quaternion.squared_norm(column) for column in columns))
     w, x, y, z = (choose(index, *components) for components in zip(*columns, strict=True))
-    # All signs in one number, and that computed once: once for the index and for each sign takes 1.3 times as long.
+    # One barrier for all signs in one number. A barrier for each sign would take 1.3 times as long.
     products = (quaternion.dot((w, x, y, z), column) for column in columns)
     zero = constant_like(w, 0)
     weights = (jnp.where(product < 0, 2.0**i, zero) for i, product in enumerate(products))
-    # The conversion truncates, and an inexact quotient may lie below the whole number.
+    # The conversion truncates, and an inexact quotient may lie below the integer.
     signs = (fusion_barrier(functools.reduce(jnp.add, weights)) + 0.5).astype(jnp.int32)
     w, x, y, z = (_signed((signs >> i & 1) == 1, column) for i, column in enumerate(columns))
-    # Never 0: its product with the longest column is the sum of |u_j·u_i|, and the columns are not all 0.
+    # The sum is never 0: its product with the longest column is the sum of |u_j·u_i|, and not all columns are 0.
     return quaternion.to_orthonormal(_sum((w, x, y, z)))
 
 
 def solve_simply(a: Mat3) -> Mat3:
-    """What the average is without the signs: it fails where the components of the quaternion add up to zero.
+    """The average without the signs: it fails where the components of the quaternion add up to zero.
 
-    For a rotation with the quaternion q the sum of the columns is 4 (w + x + y + z) q: digits are lost as the bracket
-    gets small, NaN where it is 0, and noise decides near it.
+    For a rotation with the quaternion q the sum of the columns is 4 (w + x + y + z) q. A small bracket loses digits,
+    and noise dominates near 0. A bracket of 0 gives NaN.
 
     Returns:
         Rotations, or NaN.

@@ -10,12 +10,12 @@ from jaxrot._algebra.scaling import safe_sqrt
 def solve(a: Mat3) -> Mat3:
     """The nearest rotation of a matrix with det A > 0 whose singular values are not far apart.
 
-    The square root of C = AᵀA comes from its eigenvalues by Cayley–Hamilton, without eigenvectors. For det A < 0 the
-    formula gives the nearest *reflection*, for det A = 0 it divides by zero; both are returned as they are.
+    The square root of C = AᵀA follows from its eigenvalues by Cayley–Hamilton, without eigenvectors. For det A < 0 the
+    formula gives the nearest *reflection*. For det A = 0 it divides by zero. Both results are returned unchanged.
 
     Returns:
-        In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are good to
-        eps s1², and the small one is divided by.
+        Rotations. In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are accurate to
+        eps s1², and the formula divides by the small one.
 
     Cost: about 250 flops, three square roots, one arc tangent, a sine and a cosine.
     Source: Sarabandi et al. 2020, eq. (8)–(19), where (9) and (10) must read m − √p(cos θ ± √3 sin θ) (Smith 1961); as
@@ -44,7 +44,7 @@ def smith_eigenvalues(c: Mat3) -> Vec3:
     deviator = mat3.add(c, mat3.scale(mat3.identity_like(c), -m))
     q = mat3.determinant(deviator) / 2
     p = mat3.squared_norm(deviator) / 6
-    # Where two eigenvalues are equal, rounding makes the discriminant negative.
+    # If two eigenvalues are equal, rounding can make the discriminant negative.
     theta = jnp.arctan2(safe_sqrt(p * p * p - q * q), q) / 3
     root_p = safe_sqrt(p)
     cosine, sine = root_p * jnp.cos(theta), root_p * jnp.sin(theta) * 3**0.5

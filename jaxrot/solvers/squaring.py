@@ -9,8 +9,8 @@ from jaxrot._algebra.mat3 import Mat3
 from jaxrot._algebra.quaternion import Quaternion
 from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 
-# The gap between the two largest eigenvalues of Davenport's matrix doubles with every squaring. Below these counts the
-# worst matrices, −R plus noise, are wrong: with 20 in float32 by 1.3 times the bound, with 40 in float64 by 612 times.
+# Every squaring doubles the gap between the two largest eigenvalues of Davenport's matrix. With fewer squarings the
+# worst matrices, −R plus noise, are wrong: 1.3 times the bound with 20 in float32, 612 times with 40 in float64.
 _SQUARINGS = {"float32": 24, "float64": 54}
 _POLISHING_STEPS = 2
 
@@ -18,10 +18,10 @@ _POLISHING_STEPS = 2
 def solve(a: Mat3) -> Mat3:
     """The nearest rotation, by squaring the 4×4 matrix 1 + N(A) until one eigenvector is left.
 
-    H₀ = 0.99 √3 A/‖A‖, H ← 2(H + cof H)/(1 + ‖H‖²) is exactly the repeated squaring of 1 + N(H) at a quarter of its
-    cost: no branch, no inverse, no square root, right for det A ≤ 0. Where R is not unique the limit is no rotation;
-    the largest column of 1 + N(H) is a quaternion all the same, one of those with the optimal trace. Two Newton steps
-    on the original matrix then remove the rounding of the squarings.
+    H₀ = 0.99 √3 A/‖A‖, H ← 2(H + cof H)/(1 + ‖H‖²) is exactly the repeated squaring of 1 + N(H), at a quarter of its
+    cost. It needs no branch, inverse or square root, and it is right for det A ≤ 0. If R is not unique, the limit is not
+    a rotation, but the largest column of 1 + N(H) is still a quaternion with the optimal trace. Two Newton steps on the
+    original matrix remove the rounding of the squarings.
 
     Returns:
         Rotations that keep every line of the contract; NaN where the matrix is not finite.
@@ -30,7 +30,7 @@ def solve(a: Mat3) -> Mat3:
     Source: Wu et al., "Fast analytical 3D rigid registration" (FA3R), 2018.
     """
     norm = safe_sqrt(mat3.squared_norm(a))
-    # At −R and with the factor 1 the eigenvalues of 1 + N are 2, 2, 2 and −2: squaring would not part them.
+    # With the factor 1 the eigenvalues of 1 + N at −R are 2, 2, 2 and −2, which squaring would not separate.
     h = mat3.scale(a, safe_divide(jnp.full_like(norm, 0.99 * 3**0.5), norm))
     h = lax.fori_loop(0, _SQUARINGS[a[0][0].dtype.name], lambda _, h: square(h), h)
     q = quaternion.normalise(quaternion.largest_column(quaternion.davenport_columns(h)))
@@ -40,9 +40,9 @@ def solve(a: Mat3) -> Mat3:
 
 
 def polish(a: Mat3, q: Quaternion) -> Quaternion:
-    """One Newton step; an axis whose gap is below 8 eps f moves by no more than it is determined."""
+    """One Newton step; an axis whose gap is below 8 eps f moves no further than the matrix determines it."""
     b = mat3.transpose_multiply(quaternion.to_scaled_rotation(q), a)
-    # With H formed again in every quotient the torque of matrices near −R was up to 13 times its bound in float64.
+    # Without the barrier each quotient recomputes H. The torque near −R was then up to 13 times its bound in float64.
     h, torque = fusion_barrier((mat3.gap_matrix(b), mat3.axial(b)))
     info = jnp.finfo(q[0].dtype)
     trace = jnp.abs(h[0][0] + h[1][1] + h[2][2]) * 0.5

@@ -12,26 +12,26 @@ _ITERATIONS = {"float32": 9, "float64": 10}
 def solve(a: Mat3) -> Mat3:
     """An approximation of the nearest rotation of a matrix that is nearly a rotation: A (3 C² − 10 C + 15)/8, C = AᵀA.
 
-    Every singular value x becomes x (3x⁴ − 10x² + 15)/8 = 1 + O((x − 1)³), so the result is a rotation to third order
-    in the noise, and no rotation far from one.
+    A singular value x becomes x (3x⁴ − 10x² + 15)/8 = 1 + O((x − 1)³). So the result is a rotation up to third order in
+    the noise. Far from a rotation the result is not a rotation.
 
     Returns:
-        (..., 3, 3), exact for multiples of a rotation. For det A < 0 it is nearer to a reflection.
+        Matrices, exact for multiples of a rotation. For det A < 0 the result is nearer to a reflection.
 
     Cost: 220 flops and one square root, for the scale.
-    Source: Sarabandi et al. 2020, eq. (20). The scale, which it takes to be 1, is removed first.
+    Source: Sarabandi et al. 2020, eq. (20). It assumes the scale 1; the scale is removed first.
     """
     return polynomial(unit_scaled(a))
 
 
 def solve_iterated(a: Mat3) -> Mat3:
-    """The nearest rotation of a matrix with det A > 0, by the iterated polynomial: no square root but the scale's.
+    """The nearest rotation of a matrix with det A > 0, by the iterated polynomial, without a square root except for the scale.
 
-    It converges, to third order, where every singular value is below √(7/3); ‖A‖ = √2 makes sure of that. A small one
-    grows by 15/8 a step. For det A < 0 the limit is the nearest *reflection*; a singular value 0 stays 0.
+    It converges to third order if every singular value is below √(7/3), which ‖A‖ = √2 ensures. A small singular value
+    grows by 15/8 per step. For det A < 0 the limit is the nearest *reflection*. A singular value 0 stays 0.
 
     Returns:
-        (..., 3, 3), rotations as far as the fixed number of steps reaches, s1/s3 of about 50.
+        Rotations up to s1/s3 of about 50. Beyond that the fixed number of steps is too small.
 
     Cost: 175 flops a step, 9 steps in float32 and 10 in float64.
     Source: Hasan, "Square-root free orthogonalization algorithms", 2009, in Sarabandi et al. 2020 after eq. (20).
