@@ -14,8 +14,8 @@ def solve(a: Mat3) -> Mat3:
     formula gives the nearest *reflection*. For det A = 0 it divides by zero. Both results are returned unchanged.
 
     Returns:
-        Rotations. In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are accurate to
-        eps s1², and the formula divides by the small one.
+        Rotations. In float32 the error is 4e-2 rad at singular values (1, 1, 1e-3): the eigenvalues of C are accurate
+        to eps s1², and the formula divides by the small one.
 
     Cost: about 250 flops, three square roots, one arc tangent, a sine and a cosine.
     Source: Sarabandi et al. 2020, eq. (8)–(19), where (9) and (10) must read m − √p(cos θ ± √3 sin θ) (Smith 1961); as

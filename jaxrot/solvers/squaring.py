@@ -19,9 +19,9 @@ def solve(a: Mat3) -> Mat3:
     """The nearest rotation, by squaring the 4×4 matrix 1 + N(A) until one eigenvector is left.
 
     H₀ = 0.99 √3 A/‖A‖, H ← 2(H + cof H)/(1 + ‖H‖²) is exactly the repeated squaring of 1 + N(H), at a quarter of its
-    cost. It needs no branch, inverse or square root, and it is right for det A ≤ 0. If R is not unique, the limit is not
-    a rotation, but the largest column of 1 + N(H) is still a quaternion with the optimal trace. Two Newton steps on the
-    original matrix remove the rounding of the squarings.
+    cost. It needs no branch, inverse or square root, and it is right for det A ≤ 0. If R is not unique, the limit is
+    not a rotation, but the largest column of 1 + N(H) is still a quaternion with the optimal trace. Two Newton steps on
+    the original matrix remove the rounding of the squarings.
 
     Returns:
         Rotations that keep every line of the contract; NaN where the matrix is not finite.

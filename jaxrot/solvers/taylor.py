@@ -25,7 +25,7 @@ def solve(a: Mat3) -> Mat3:
 
 
 def solve_iterated(a: Mat3) -> Mat3:
-    """The nearest rotation of a matrix with det A > 0, by the iterated polynomial, without a square root except for the scale.
+    """The nearest rotation of a matrix with det A > 0, by the iterated polynomial. Only the scale needs a root.
 
     It converges to third order if every singular value is below √(7/3), which ‖A‖ = √2 ensures. A small singular value
     grows by 15/8 per step. For det A < 0 the limit is the nearest *reflection*. A singular value 0 stays 0.
