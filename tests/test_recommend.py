@@ -165,7 +165,7 @@ def test_the_domain_is_asked_of_all_matrices_and_the_extremes_are_in_the_sample(
     monkeypatch.setattr(sample_module, "EXTREMES", 1)
     matrices = np.concatenate([noisy(500, 0.01), stretched((1, 0.05, 0.05), 1), stretched((1, 1, -0.5), 2)])
     sample = take_sample(matrices[np.random.default_rng(0).permutation(503)], None, None)
-    assert (sample.given, sample.finite, sample.not_upright, len(sample.judged.matrices)) == (503, 503, 2, 20)
+    assert (sample.given, sample.finite, sample.n_inverted, len(sample.judged.matrices)) == (503, 503, 2, 20)
     assert sample.largest_condition == pytest.approx(10, rel=1e-5)
     assert sample.judged.condition.max() == pytest.approx(10, rel=1e-5)
     assert sample.judged.is_inverted.any()

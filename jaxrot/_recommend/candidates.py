@@ -95,8 +95,8 @@ def outside_domain(method: Method, sample: Sample) -> str | None:
     - if it is an approximation and some κ > 1, that is s2+s3 < s1. Approximations are for matrices near a rotation,
       κ = ½. They declare no limit in units of eps, because their error is not rounding.
     """
-    if not method.handles_inversion and sample.not_upright:
-        return f"for det A > 0, and {sample.not_upright:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
+    if not method.handles_inversion and sample.n_inverted:
+        return f"for det A > 0, and {sample.n_inverted:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
     limit = method.condition_limit[sample.dtype]
     largest = sample.largest_condition
     # At a limit this high nothing is excluded, not even matrices without a unique R*.

@@ -32,7 +32,7 @@ class Sample(NamedTuple):
         starts: The rotations to start from, one a matrix of the sample, or None.
         given: Number of matrices given.
         not_finite: Number of matrices left out because they or their starts hold NaN or inf.
-        not_upright: Number of finite matrices with det A < 0, or 0 up to rounding.
+        n_inverted: Number of finite matrices with det A < 0, or 0 up to rounding.
         largest_condition: Largest κ of the finite matrices; inf if an R* is not unique up to rounding.
     """
 
@@ -40,7 +40,7 @@ class Sample(NamedTuple):
     starts: np.ndarray | None
     given: int
     not_finite: int
-    not_upright: int
+    n_inverted: int
     largest_condition: float
 
     @property
@@ -96,7 +96,7 @@ def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLik
         given=given,
         not_finite=given - len(a),
         # Below this the sign of the determinant is rounding, and so is the result of a method for det A > 0.
-        not_upright=int(np.sum(relative_s3 <= 8 * float(np.finfo(a.dtype).eps))),
+        n_inverted=int(np.sum(relative_s3 <= 8 * float(np.finfo(a.dtype).eps))),
         largest_condition=float(condition.max()),
     )
 
