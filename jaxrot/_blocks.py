@@ -34,7 +34,7 @@ def in_blocks(function: Callable[_P, _Result], size: int = 65_536) -> Callable[_
     Returns:
         The function in blocks, compiled once for each shape, also without `jit`. Blocks are of equal size if one above
         size/2 divides the batch; else the last is smaller. Batches up to `size` are not split, nor is a first axis that
-        is symbolic in `jax.export`. The returned function can be pickled and hashed if `function` can.
+        is symbolic in `jax.export`. The result can be pickled and hashed if `function` can.
 
     Raises:
         ValueError: A size that is not positive, arrays whose first axes differ.

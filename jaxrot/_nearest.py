@@ -38,9 +38,8 @@ def nearest_rotation(matrix: ArrayLike, *, method: str = DEFAULT_METHOD, damping
         tr(RᵀA), always the same in one compiled program; another program may return another.
 
     Derivative:
-        One rule for all methods, in forward and reverse mode, to any order. Exact at equal singular values. Finite for
-        every finite matrix: it tends to 0 along an axis whose gap sᵢ+sⱼ is below about 64 eps·tr(RᵀA), and stays at a
-        large finite value where it would overflow.
+        One rule for all methods, forward and reverse, to any order. Exact at equal singular values. Finite for
+        every finite matrix: 0 in the limit of a gap sᵢ+sⱼ below about 64 eps·tr(RᵀA), and large instead of overflowing.
 
     Accuracy:
         Default method, κ = s1/(s2+s3) < 1/(8 eps), eps of the computing dtype: ‖R − R*‖_F is at most 8 eps (1+κ) for

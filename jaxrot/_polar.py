@@ -48,12 +48,12 @@ def polar_decomposition(matrix: ArrayLike, *, method: str = DEFAULT_METHOD) -> P
         TypeError: Complex or non-numeric matrix, traced method.
 
     Uniqueness:
-        R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|, the always unique eigenvalues of S.
-        If s3 ≥ 0, S is the square root of AᵀA, unique even if R is not. If s3 < 0, S is unique iff R is.
+        R is unique iff s2+s3 > 0 for the signed singular values s1 ≥ s2 ≥ |s3|, the eigenvalues of S.
+        If s3 ≥ 0, S = √(AᵀA), unique even if R is not. If s3 < 0, S is unique iff R is.
 
     Derivative:
         R as in `nearest_rotation`, Ṙ = R[ω]×, and Ṡ = RᵀȦ − [ω]× S. To any order, exact at equal singular values. Both
-        use the same ω. It is damped to 0 about an axis whose gap sᵢ+sⱼ is below about 64 eps tr S. Ṡ does not depend on
+        use the same ω. It is damped to 0 about an axis with a gap sᵢ+sⱼ below about 64 eps tr S. Ṡ does not depend on
         the scale of A, and is at most a few κ = s1/(s2+s3) times Ȧ.
 
     Accuracy:

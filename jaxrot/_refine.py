@@ -39,14 +39,14 @@ def refine_rotation(
 ) -> jax.Array:
     """Returns a rotation closer to the one nearest to a 3×3 matrix, by a fixed number of steps from a warm start.
 
-    In a simulation start from the rotation of the last frame.
+    In a simulation start from the last rotation.
 
     Args:
         matrix: A, real, shape (..., 3, 3), any scale.
         rotation: The start, shape (..., 3, 3), times any positive factor. The batch axes broadcast.
         step: A name in `STEPS`. Static.
         iterations: Number of steps, ≥ 0. Static.
-        escape: Leave a start that no step would move although it is not nearest. Static.
+        escape: Leave a start that is not nearest but that no step moves. Static.
         derivative: `"implicit"` or `"unrolled"`. Static.
 
     Returns:
@@ -58,8 +58,8 @@ def refine_rotation(
 
     Uniqueness:
         The start decides what A leaves undetermined: everything for A = 0, the angle about the free axis for rank 1
-        (with `quest` to √eps). A start Q with zero torque, QᵀA = AᵀQ, is returned even if it is not nearest (exactly
-        half a turn off), unless `escape` is on.
+        (with `quest` to √eps). A start Q exactly half a turn off has zero torque, QᵀA = AᵀQ, and is returned
+        unless `escape` is on.
 
     Derivative:
         `"implicit"`: that of `nearest_rotation`, and 0 with respect to the start. Right at convergence, to any order.

@@ -32,17 +32,17 @@ def recommend(
         dtype: float32 or float64; by default that of `matrices`. Half precision is measured in float32, unrounded.
 
     Returns:
-        The fastest candidate whose error on the sample is at most tolerance / 2. Candidates are equally fast if their
-        median time is below the fastest one's upper quartile; of these the most accurate is returned. If none is
-        accurate enough, `meets` is False, and the most accurate one is returned.
+        The fastest candidate whose error on the sample is at most tolerance / 2. Of those whose median time is below
+        the fastest one's upper quartile, the most accurate is returned. If none is accurate enough, `meets` is False,
+        and the most accurate one is returned.
 
     Raises:
         ValueError: Wrong shape, no finite matrix, tolerance not positive, `previous` not rotations, unusable dtype.
         TypeError: Complex, non-numeric or traced arrays; tolerance or dtype of the wrong type.
 
     Accuracy:
-        A method is excluded if any finite input lies outside the domain it declares in `METHODS`. If κ ≥ 1/(8 eps), R*
-        is not determined; then the lost trace tr(R*ᵀA) − tr(RᵀA) is judged instead of the error.
+        A method is excluded if any finite input lies outside the domain it declares in `METHODS`. If κ ≥ 1/(8 eps), the
+        lost trace tr(R*ᵀA) − tr(RᵀA) is judged instead of the error.
 
     Cost:
         Some seconds to half a minute: up to twenty programs are compiled and run. Call it once, outside `jit`.
