@@ -156,20 +156,19 @@ def _refine_rotation(matrix: jax.Array, rotation: jax.Array, *, options: _Option
     # The shift is the scale c of the start c·Q, at least 2 after scaling. With a fixed shift the columns would be
     # multiples of Q's quaternion at one scale only. A start of zeros has the shift 1 and becomes the identity.
     columns = quaternion.davenport_columns(start, nonzero_sqrt(mat3.squared_norm(start) / 3, smallest=1.0))
-    # The length and the sign of this quaternion do not matter. The start is the quaternion of its largest column. So a
+    # The sign of this quaternion does not matter. The start is the quaternion of its largest column. So a
     # tangent of the start that leaves the rotations has a derivative too, but no meaning.
     return mat3.stack(quaternion.to_orthonormal(_refine(matrix, quaternion.largest_column(columns), options)))
 
 
 @compiled
 def _refine_quaternion(matrix: jax.Array, quaternion_wxyz: jax.Array, *, options: _Options) -> jax.Array:
-    start = quaternion.normalise(scaled(quaternion.components(quaternion_wxyz)))
-    return quaternion.stack(quaternion.renormalise(_refine(matrix, start, options)))
+    return quaternion.stack(_refine(matrix, scaled(quaternion.components(quaternion_wxyz)), options))
 
 
 def _refine(matrix: jax.Array, start: Quaternion, options: _Options) -> Quaternion:
     step, iterations, escape, derivative = options
-    wxyz = quaternion.stack(start)
+    wxyz = quaternion.stack(quaternion.normalise(start))
     batch = jnp.broadcast_shapes(matrix.shape[:-2], wxyz.shape[:-1])
     matrix, wxyz = jnp.broadcast_to(matrix, (*batch, 3, 3)), jnp.broadcast_to(wxyz, (*batch, 4))
     if derivative == "unrolled":
@@ -187,7 +186,8 @@ def _iterated(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, es
     q = (w + zero, x + zero, y + zero, z + zero)
     if escape:
         q = leave_equilibrium(a, q)
-    return quaternion.stack(iterate(STEPS[step].correction, a, q, iterations))
+    # With a unit quaternion at both ends XLA:CPU of jax 0.12 computes each matrix of a tiny batch in the same way.
+    return quaternion.stack(quaternion.renormalise(iterate(STEPS[step].correction, a, q, iterations)))
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(2, 3, 4, 5))

@@ -59,7 +59,7 @@ def one_step(step: str, without: tuple[str, ...] = ()) -> Callable[[jax.Array, j
         if ESCAPE not in without:
             q = leave_equilibrium(a, q)
         if "renormalisation" not in without:
-            return quaternion.stack(iterate(correction, a, q, 1))
+            return quaternion.stack(quaternion.renormalise(iterate(correction, a, q, 1)))
         b = mat3.transpose_multiply(quaternion.to_rotation(q), a)
         return quaternion.stack(quaternion.product(q, correction(b)))
 
