@@ -62,7 +62,7 @@ __all__ = [
     "twist_modes",
 ]
 
-# What measures is loaded when it is asked for.
+# These load the code that measures, so they are imported on first use.
 _LAZY = {"Recommendation": "jaxrot._recommend.result", "recommend": "jaxrot._recommend.recommend"}
 
 

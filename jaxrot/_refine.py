@@ -186,7 +186,7 @@ def _iterated(matrix: jax.Array, wxyz: jax.Array, step: str, iterations: int, es
     q = (w + zero, x + zero, y + zero, z + zero)
     if escape:
         q = leave_equilibrium(a, q)
-    # With a unit quaternion at both ends XLA:CPU of jax 0.12 computes each matrix of a tiny batch in the same way.
+    # Without a unit quaternion at both ends XLA:CPU of jax 0.12 rounds the matrices of a batch of two differently.
     return quaternion.stack(quaternion.renormalise(iterate(STEPS[step].correction, a, q, iterations)))
 
 

@@ -1,7 +1,7 @@
 """What the compilers for a TPU and for an H100 make of the programs, ahead of time and without either.
 
 Each test runs where its compiler is installed: `pip install "jax[tpu]"` or `pip install "jax[cuda12]"`, in an
-environment of its own beside the test extra, then `pytest -m exhaustive tests/test_ahead_of_time.py`.
+environment of its own together with the test extra, then `pytest -m exhaustive tests/test_ahead_of_time.py`.
 """
 
 import importlib.util

@@ -29,7 +29,7 @@ CORE = {name for layer in LAYERS[:10] for name in layer}
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-# What the core may import beside jax, jaxlib, numpy and itself: modules of Python that load fast.
+# The core imports jax, jaxlib, numpy, itself, and these modules of Python, which load fast.
 STANDARD = {"collections", "dataclasses", "functools", "inspect", "math", "random", "time", "types", "typing"}
 STANDARD |= {"importlib", "warnings", "zlib"}
 OF_STARTUP = {"contextlib", "os", "signal", "sys"}

@@ -1,4 +1,4 @@
-"""The suite catches what it is for: each mutant of the package fails the tests named beside it."""
+"""The suite catches what it is for: each mutant of the package fails the tests that it names."""
 
 import os
 import pathlib

@@ -72,9 +72,9 @@ def unit_scaled(m: Mat3) -> Mat3:
 
 
 def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
-    """The quotient, and 0 where the denominator is 0; the derivative is finite there too.
+    """The quotient, or 0 if the denominator is 0; the derivative is finite there too.
 
-    The division comes last. XLA:CPU stores quotients, but computes a choice again in every fusion that uses it.
+    The division comes last: XLA:CPU stores a quotient, but recomputes a selection in every fusion that uses it.
     """
     is_zero = denominator == 0
     safe = jnp.where(is_zero, jnp.ones_like(denominator), denominator)
@@ -82,7 +82,7 @@ def safe_divide(numerator: jax.Array, denominator: jax.Array) -> jax.Array:
 
 
 def safe_sqrt(square: jax.Array) -> jax.Array:
-    """√square, and 0 where it is zero or, by rounding, below; the derivative there is 0 instead of infinite."""
+    """√square, or 0 if the square is 0 or, by rounding, negative. The derivative is then 0 instead of infinite."""
     is_zero = square <= 0
     root = jnp.sqrt(jnp.where(is_zero, jnp.ones_like(square), square))
     return jnp.where(is_zero, jnp.zeros_like(root), root)

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
 
     Raises:
         UserError: Something the user can fix.
-        UnreadError: Nobody reads standard output.
+        UnreadError: The reader closed standard output.
         KeyboardInterrupt: The command was interrupted before there was a result.
     """
     tolerance = _parse_tolerance(options.tolerance)

@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
 
     Raises:
         UserError: Something the user can fix.
-        UnreadError: Nobody reads standard output. The files are written.
+        UnreadError: The reader closed standard output. The files are written.
         KeyboardInterrupt: The measurements were interrupted.
     """
     if options.bench:

@@ -51,7 +51,7 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
 
     Raises:
         UserError: Something the user can fix.
-        UnreadError: Nobody reads standard output; the files are written.
+        UnreadError: The reader closed standard output; the files are written.
         KeyboardInterrupt: The command was interrupted before the first step.
     """
     if options.scene not in SCENES:

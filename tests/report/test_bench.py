@@ -30,7 +30,7 @@ def measured():
 def test_every_goal_is_measured_at_its_batch(measured):
     batches = {goal.what: goal.batch for goal in measured.goals}
     assert batches["svd over default"] == batches["value and VJP over value"] == 32
-    assert batches["svd over default in blocks"] == batches["MiB beside input and output, in blocks"] == 32
+    assert batches["svd over default in blocks"] == batches["MiB of temporary arrays, in blocks"] == 32
     assert batches["slowest over fastest batch, a matrix"] == 48
     assert {goal.batch for goal in measured.goals if "fastest other" in goal.what} == {1, 2}
     assert all(0 < goal.quartile_1 <= goal.median <= goal.quartile_3 for goal in measured.goals)

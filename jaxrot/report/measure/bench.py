@@ -139,7 +139,7 @@ def _large(bench: Bench, size: Size) -> None:
     memory = jax.jit(functions["default in blocks"][0]).lower(a).compile().memory_analysis()
     if memory is not None:
         mebibytes = np.array(memory.temp_size_in_bytes / 2**20)
-        _add(bench, "MiB beside input and output, in blocks", batch, mebibytes, at_most=64)
+        _add(bench, "MiB of temporary arrays, in blocks", batch, mebibytes, at_most=64)
 
 
 def _growth(bench: Bench, size: Size) -> None:
