@@ -15,15 +15,10 @@ _PASSES = 2
 
 
 def without_momentum(changes: jax.Array, arms: jax.Array, shares: jax.Array) -> jax.Array:
-    """Returns the changes of velocity without their rigid part: they change no momentum of their cluster.
+    """Returns changes u of velocity without their rigid part, u − ū − ω×r with ω = I⁻¹ Σ w r×u, shape (c, s, 3).
 
-    Args:
-        changes: Of the velocity in every place of the cluster, shape (c, s, 3).
-        arms: Places from the centre of mass, shape (c, s, 3).
-        shares: The fraction of the cluster's mass in every place, shape (c, s, 1).
-
-    Returns:
-        u − ū − ω×r, ω = I⁻¹ Σ w r×u, shape (c, s, 3): Σ w u = 0 and Σ w r×u = 0, to rounding.
+    They change no momentum of their cluster: Σ w u = 0 and Σ w r×u = 0, to rounding. The arms r lead from the centre of
+    mass, shape (c, s, 3). The shares w are the fractions of the cluster's mass, shape (c, s, 1).
 
     Source: Müller et al. 2007, "Position based dynamics", section 3.5, for velocities.
     """

@@ -10,16 +10,16 @@ def tumbling_rates(inertia: ArrayLike, rates: ArrayLike, period_steps: int) -> t
     """Returns the body rates over one period of Euler's equations I ω' = (I ω) × ω without torque.
 
     Args:
-        inertia: Principal moments, kg m², ascending, shape (3,).
-        rates: Body rates ω at the start, rad/s, shape (..., 3).
-        period_steps: The number of steps in a period.
+        inertia: Principal moments, ascending, shape (3,), kg m².
+        rates: Body rates ω at the start, shape (..., 3), rad/s.
+        period_steps: The number of steps in a period, 8 or more.
 
     Returns:
-        The rates in the middle of every step, rad/s, shape (period_steps, ..., 3), and the time step, s, shape (...).
+        The rates in the middle of every step, shape (period_steps, ..., 3), rad/s, and the time step, shape (...), s.
 
     Raises:
-        ValueError: Moments that are not finite, positive and different; rates that are not finite; a spin that has no
-            period, about a principal axis or on the separatrix; fewer than 8 steps.
+        ValueError: Moments that are not finite, positive and different; rates that are not finite; a spin without a
+            period, about a principal axis or on the separatrix; too few steps.
 
     Source: Landau and Lifshitz, Mechanics, section 37, for the period.
     """
