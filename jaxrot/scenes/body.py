@@ -12,9 +12,9 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jaxrot._compiled import exportable
+from jaxrot.scenes.checks import check, checked_vertices
 from jaxrot.scenes.clusters import padded, two_scale_clusters
 from jaxrot.scenes.incidence import incidence
-from jaxrot.scenes.scene import LARGEST_COORDINATE
 
 
 @exportable
@@ -23,25 +23,15 @@ class Body(NamedTuple):
 
     The mass of a vertex is divided equally between its clusters. So the mean of the clusters' changes conserves
     momentum.
-
-    Attributes:
-        rest_positions: Of the vertices, m, shape (n, 3).
-        masses: Of the vertices, kg, shape (n,).
-        members: The vertex in every place of a cluster, int32, shape (c, s); 0 in empty places.
-        shares: The fraction of the cluster's mass in every place, shape (c, s). They sum to 1, and are 0 in empty
-            places.
-        offsets: Places at rest from the cluster's centre of mass, m, shape (c, s, 3).
-        places: The places of a vertex, int32 indices into the c·s places, shape (n, k), filled up with c·s.
-        cluster_counts: The number of clusters of a vertex, shape (n,), as a floating-point number.
     """
 
-    rest_positions: jax.Array
-    masses: jax.Array
-    members: jax.Array
-    shares: jax.Array
-    offsets: jax.Array
-    places: jax.Array
-    cluster_counts: jax.Array
+    rest_positions: jax.Array  # Of the vertices, shape (n, 3), m
+    masses: jax.Array  # Of the vertices, shape (n,), kg
+    members: jax.Array  # The vertex in every place of a cluster, int32, shape (c, s); 0 in empty places
+    shares: jax.Array  # The fraction of the cluster's mass in every place, shape (c, s); 0 in empty places
+    offsets: jax.Array  # Places at rest from the cluster's centre of mass, shape (c, s, 3), m
+    places: jax.Array  # The places of a vertex, int32 indices into the c·s places, shape (n, k), filled up with c·s
+    cluster_counts: jax.Array  # The number of clusters of a vertex, shape (n,), as a floating-point number
 
 
 def build_body(
@@ -65,25 +55,20 @@ def build_body(
     """
     vertices = checked_vertices(rest_vertices)
     mass = np.full(len(vertices), 1 / len(vertices)) if masses is None else np.asarray(masses, dtype=np.float64)
-    if mass.shape != (len(vertices),) or not (np.isfinite(mass).all() and (mass > 0).all()):
-        raise ValueError(
-            f"masses must be {len(vertices)} positive finite numbers; got shape {mass.shape}{_worst(mass)}"
-        )
+    if mass.shape != (len(vertices),):
+        raise ValueError(f"masses must have shape ({len(vertices)},); got {mass.shape}")
+    check("finite and > 0", masses=mass)
     members, filled = padded(clusters, len(vertices))
     places, counts = incidence(members, len(vertices), filled=filled)
     shares = np.where(filled, (mass / counts)[members], 0.0)
     shares /= shares.sum(axis=1, keepdims=True)
     centres = np.einsum("cs,csi->ci", shares, vertices[members])
     offsets = np.where(filled[..., None], vertices[members] - centres[:, None], 0.0)
-    return Body(
-        jnp.asarray(vertices, dtype),
-        jnp.asarray(mass, dtype),
-        jnp.asarray(members, jnp.int32),
-        jnp.asarray(shares, dtype),
-        jnp.asarray(offsets, dtype),
-        jnp.asarray(places, jnp.int32),
-        jnp.asarray(counts, dtype),
+    places, members = (jnp.asarray(indices, jnp.int32) for indices in (places, members))
+    vertices, mass, shares, offsets, counts = (
+        jnp.asarray(numbers, dtype) for numbers in (vertices, mass, shares, offsets, counts)
     )
+    return Body(vertices, mass, members, shares, offsets, places, counts)
 
 
 def build_two_scale_body(
@@ -92,10 +77,10 @@ def build_two_scale_body(
     """Returns a body with clusters of neighbours, two for every vertex on average, and clusters across the whole body.
 
     Args:
-        rest_vertices: Shape (n, 3), m.
-        masses: Of the vertices, kg, shape (n,); 1/n each if not given.
+        rest_vertices: As for `build_body`.
+        masses: As for `build_body`.
         cluster_size: Vertices in a cluster.
-        dtype: Of the floating-point arrays.
+        dtype: As for `build_body`.
 
     Raises:
         ValueError: As `build_body`; a size that is not positive.
@@ -107,23 +92,3 @@ def build_two_scale_body(
         raise ValueError(f"cluster_size must be positive; got {cluster_size}")
     vertices = checked_vertices(rest_vertices)
     return build_body(vertices, two_scale_clusters(vertices, cluster_size), masses, dtype=dtype)
-
-
-def checked_vertices(vertices: ArrayLike, name: str = "vertices") -> np.ndarray:
-    """Returns the vertices as float64 of shape (n, 3), or raises a ValueError."""
-    checked = np.asarray(vertices, dtype=np.float64)
-    if checked.ndim != 2 or checked.shape[1] != 3 or not len(checked):
-        raise ValueError(f"{name} must have shape (n, 3), n > 0; got shape {checked.shape}")
-    bad = np.flatnonzero(~np.isfinite(checked).all(axis=1))
-    if len(bad):
-        raise ValueError(f"{name} must be finite; vertex {bad[0]} is {checked[bad[0]].tolist()}")
-    if np.abs(checked).max() > LARGEST_COORDINATE:
-        raise ValueError(
-            f"{name} must be at most {LARGEST_COORDINATE:g} from the origin; got {np.abs(checked).max():.3g}"
-        )
-    return checked
-
-
-def _worst(masses: np.ndarray) -> str:
-    bad = masses[~(np.isfinite(masses) & (masses > 0))]
-    return f" with {bad.ravel()[0]}" if bad.size else ""

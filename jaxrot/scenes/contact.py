@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 from jaxrot._compiled import exportable
+from jaxrot.scenes.checks import check
 
 # Lower and upper corner, each of three numbers.
 Corners = Sequence[Sequence[float]] | np.ndarray
@@ -16,29 +17,21 @@ Corners = Sequence[Sequence[float]] | np.ndarray
 
 @exportable
 class Contact(NamedTuple):
-    """The obstacles, and how points respond to them.
+    """The obstacles, and how points respond to them."""
 
-    Attributes:
-        ground_height: Of the ground, whose normal is the third axis, m, shape ().
-        box: Lower and upper corner of a box around the points, m, shape (2, 3).
-        obstacle: Lower and upper corner of a box that the points must not enter, m, shape (2, 3).
-        restitution: The fraction of the normal velocity after an impact, 0 to 1, shape ().
-        friction: Coulomb's coefficient, ≥ 0, shape ().
-    """
-
-    ground_height: jax.Array
-    box: jax.Array
-    obstacle: jax.Array
-    restitution: jax.Array
-    friction: jax.Array
+    ground_height: jax.Array  # Of the ground, whose normal is the third axis, shape (), m
+    box: jax.Array  # Lower and upper corner of a box around the points, shape (2, 3), m
+    obstacle: jax.Array  # Lower and upper corner of a box that the points must not enter, shape (2, 3), m
+    restitution: jax.Array  # The fraction of the normal velocity after an impact, 0 to 1, shape ()
+    friction: jax.Array  # Coulomb's coefficient, ≥ 0, shape ()
 
 
 @exportable
 class Motion(NamedTuple):
-    """The positions, m, and velocities, m/s, of points, each of shape (n, 3)."""
+    """The motion of points."""
 
-    positions: jax.Array
-    velocities: jax.Array
+    positions: jax.Array  # Shape (n, 3), m
+    velocities: jax.Array  # Shape (n, 3), m/s
 
 
 def build_contact(
@@ -63,10 +56,8 @@ def build_contact(
         raise ValueError(f"obstacle must be a lower and an upper corner, shape (2, 3); got {solid.tolist()}")
     if np.isnan(ground_height):
         raise ValueError("ground_height must be a number; got nan")
-    if not 0 <= restitution <= 1:
-        raise ValueError(f"restitution must be from 0 to 1; got {restitution}")
-    if not (np.isfinite(friction) and friction >= 0):
-        raise ValueError(f"friction must be finite and >= 0; got {friction}")
+    check("from 0 to 1", restitution=restitution)
+    check("finite and >= 0", friction=friction)
     return Contact(*(jnp.asarray(value, dtype) for value in (ground_height, corners, solid, restitution, friction)))
 
 
@@ -94,16 +85,10 @@ def stay_out_of_obstacle(motion: Motion, contact: Contact) -> Motion:
 
 
 def pushed_out(motion: Motion, displacements: jax.Array, contact: Contact) -> Motion:
-    """Moves points to the surface of an obstacle, and applies restitution and friction to their velocities.
+    """Moves points by the shortest way out of an obstacle, shape (n, 3), m; 0 for points without contact.
 
-    Args:
-        motion: The points.
-        displacements: The shortest way out, m, shape (n, 3); 0 for points without contact.
-        contact: Restitution and friction.
-
-    Returns:
-        The points on the surface. An inward normal velocity is reversed and multiplied by the restitution. The
-        tangential velocity decreases by the friction coefficient times the change of the normal one, at most to 0.
+    An inward normal velocity is reversed and multiplied by the restitution. The tangential velocity decreases by the
+    friction coefficient times the change of the normal one, at most to 0.
     """
     normals = safe_divide(displacements, jnp.broadcast_to(_lengths(displacements), displacements.shape))
     normal_speeds = jnp.sum(motion.velocities * normals, axis=-1, keepdims=True)

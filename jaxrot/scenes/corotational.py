@@ -16,48 +16,26 @@ from jaxrot import METHODS, STEPS
 from jaxrot._compiled import exportable
 from jaxrot.scenes import elasticity
 from jaxrot.scenes import tetrahedra as meshes
+from jaxrot.scenes.checks import check, check_gravity
 from jaxrot.scenes.elasticity import Elements
 from jaxrot.scenes.incidence import incidence
 from jaxrot.scenes.newton import Choices, Problem, minimise
+from jaxrot.scenes.scene import BodyState as State
 
 INTEGRATORS = ("euler", "midpoint")
 TANGENTS = ("exact", "held", "projected")
 
 
 @exportable
-class State(NamedTuple):
-    """The state of the body.
-
-    Attributes:
-        positions: Shape (n, 3), m.
-        velocities: Shape (n, 3), m/s.
-        rotations: Of each element, shape (m, 3, 3): the warm start of the next step.
-    """
-
-    positions: jax.Array
-    velocities: jax.Array
-    rotations: jax.Array
-
-
-@exportable
 class Parameters(NamedTuple):
-    """The parameters, which a step does not change.
+    """The parameters, which a step does not change."""
 
-    Attributes:
-        elements: The elements and their stiffness.
-        masses: Shape (n,), kg.
-        free: 1 for a vertex that moves, 0 for a fixed one, shape (n,).
-        gravity: Shape (3,), m/s².
-        damping: α of a drag −α M v, a scalar, 1/s.
-        time_step: h, a scalar, s.
-    """
-
-    elements: Elements
-    masses: jax.Array
-    free: jax.Array
-    gravity: jax.Array
-    damping: jax.Array
-    time_step: jax.Array
+    elements: Elements  # The elements and their stiffness
+    masses: jax.Array  # Shape (n,), kg
+    free: jax.Array  # 1 for a vertex that moves, 0 for a fixed one, shape (n,)
+    gravity: jax.Array  # Shape (3,), m/s²
+    damping: jax.Array  # α of a drag −α M v, shape (), 1/s
+    time_step: jax.Array  # h, shape (), s
 
 
 def build(
@@ -91,15 +69,11 @@ def build(
         ValueError: An unusable mesh, a parameter that is not finite or has the wrong sign.
     """
     mesh = meshes.checked(vertices, tetrahedra)
-    _check_positive("young", young)
-    _check_positive("density", density)
-    _check_positive("time_step", time_step)
+    check("finite and > 0", young=young, density=density, time_step=time_step)
+    check("finite and >= 0", damping=damping)
+    check_gravity(gravity)
     if not -1 < poisson < 0.5:
         raise ValueError(f"poisson must be above -1 and below 1/2; got {poisson}")
-    if not (np.isfinite(damping) and damping >= 0):
-        raise ValueError(f"damping must be finite and >= 0; got {damping}")
-    if np.shape(gravity) != (3,) or not np.isfinite(gravity).all():
-        raise ValueError(f"gravity must be three finite numbers; got {gravity}")
     held = np.zeros(len(mesh.vertices), dtype=bool) if fixed is None else np.asarray(fixed)
     if held.shape != (len(mesh.vertices),) or held.dtype != np.bool_:
         raise ValueError(f"fixed must be bool of shape ({len(mesh.vertices)},); got {held.dtype} of {held.shape}")
@@ -206,11 +180,6 @@ def euler_problem(state: State, parameters: Parameters, seconds: jax.Array, *, g
         load=parameters.masses[:, None] * push,
         free=parameters.free,
     )
-
-
-def _check_positive(name: str, value: float | np.ndarray) -> None:
-    if not (np.isfinite(value).all() and (np.asarray(value) > 0).all()):
-        raise ValueError(f"{name} must be finite and > 0; got {value}")
 
 
 def _check_choices(integrator: str, choices: Choices) -> None:

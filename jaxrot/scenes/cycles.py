@@ -17,17 +17,11 @@ _DIGIT = 1 << 16
 
 
 class Cycle(NamedTuple):
-    """The product of a cycle of rotations, and the products of its first rotations.
+    """The product of a cycle of rotations, and the products of its first rotations."""
 
-    Attributes:
-        beginnings: P_r, the products of the first r rotations, r = 0 ... period − 1, shape (period, ..., 3, 3).
-        axis: The unit axis of C, shape (..., 3).
-        turns: The angle of C in turns, from 0 to 1, as three digits, uint32, shape (..., 3).
-    """
-
-    beginnings: jax.Array
-    axis: jax.Array
-    turns: jax.Array
+    beginnings: jax.Array  # P_r, the products of the first r rotations, r = 0 ... period − 1, shape (period, ..., 3, 3)
+    axis: jax.Array  # The unit axis of C, shape (..., 3)
+    turns: jax.Array  # The angle of C in turns, from 0 to 1, as three digits, uint32, shape (..., 3)
 
 
 def rotations(vectors: np.ndarray) -> np.ndarray:
@@ -37,10 +31,9 @@ def rotations(vectors: np.ndarray) -> np.ndarray:
 
 
 def of(increments: np.ndarray) -> Cycle:
-    """Returns the cycle of the rotations nearest to the increments, computed in float64, in their dtype.
+    """Returns the cycle of the rotations nearest to the increments, in their dtype, computed in float64.
 
-    Args:
-        increments: Rotations up to rounding, each by less than half a turn, shape (period, ..., 3, 3).
+    The increments, shape (period, ..., 3, 3), are rotations up to rounding, each by less than half a turn.
     """
     nearest = increments.astype(np.float64)
     for _ in range(2):  # Newton and Schulz, which squares an error of 1e-7 each time
@@ -66,12 +59,7 @@ def of(increments: np.ndarray) -> Cycle:
 
 
 def power(cycle: Cycle, count: jax.Array) -> jax.Array:
-    """Returns the product of the first `count` rotations of the repeated cycle, shape (..., 3, 3), dtype of the cycle.
-
-    Args:
-        cycle: See `Cycle`.
-        count: Not negative, int32, shape ().
-    """
+    """Returns the product of the first `count` ≥ 0 rotations of the repeated cycle, shape (..., 3, 3)."""
     period = len(cycle.beginnings)
     angle = _angle(cycle.turns, (count // period).astype(jnp.uint32), cycle.axis.dtype)[..., None]
     beginning = cycle.beginnings[count % period]
@@ -99,13 +87,9 @@ def _angle(turns: jax.Array, factor: jax.Array, dtype: np.dtype) -> jax.Array:
 
 
 def _matrices(wxyz: np.ndarray) -> np.ndarray:
-    w, x, y, z = np.moveaxis(wxyz, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    """The rotations 1 + 2w [v]× + 2 [v]×² of unit quaternions (w, v)."""
+    cross = np.cross(np.eye(3), wxyz[..., None, 1:])
+    return np.eye(3) + 2 * (wxyz[..., :1, None] * cross + cross @ cross)
 
 
 def _hamilton(p: np.ndarray, q: np.ndarray) -> np.ndarray:

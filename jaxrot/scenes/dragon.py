@@ -2,26 +2,21 @@
 
 from importlib import resources
 
-import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot.scenes.body import build_two_scale_body, checked_vertices
-from jaxrot.scenes.scene import Scene
+from jaxrot.scenes.body import build_two_scale_body
+from jaxrot.scenes.checks import checked_vertices
+from jaxrot.scenes.scene import Scene, body_scene
 from jaxrot.scenes.shape_health import health
 from jaxrot.scenes.shape_matching import build_parameters, build_state, step
 
-STEP_SECONDS = 1 / 60
-
 
 def rest_vertices(*, fine: bool = False) -> np.ndarray:
-    """The vertices at rest, centred and one unit high, the second axis up.
+    """The vertices at rest, centred and one unit high, the second axis up: float64 of shape (n, 3).
 
     Args:
         fine: 22,998 vertices instead of 5,205.
-
-    Returns:
-        float64 of shape (n, 3).
     """
     file_name = "dragon_fine.npz" if fine else "dragon.npz"
     with resources.files("jaxrot.scenes").joinpath(file_name).open("rb") as file, np.load(file) as archive:
@@ -59,15 +54,7 @@ def dragon_fine() -> Scene:
 def _recovery(name: str, vertices: np.ndarray, seed: int) -> Scene:
     body = build_two_scale_body(vertices)
     # A low stiffness, so that the recovery is visible: at stiffness 1 it takes only 50 steps.
-    parameters = build_parameters(body, time_step=STEP_SECONDS, stiffness=0.05, damping=0.2)
+    parameters = build_parameters(body, stiffness=0.05, damping=0.2)
     scrambled = np.random.default_rng(seed).uniform(vertices.min(axis=0), vertices.max(axis=0), vertices.shape)
-    return Scene(
-        title=f"{name}: {len(vertices):,} scrambled vertices recover their shape",
-        state=build_state(body, scrambled),
-        step=lambda state: step(state, parameters),
-        health=lambda state: health(state, parameters),
-        points=lambda state: jnp.asarray(state.positions),
-        lines=np.empty((0, 2), dtype=np.intp),
-        step_seconds=STEP_SECONDS,
-        steps=240,
-    )
+    title = f"{name}: {len(vertices):,} scrambled vertices recover their shape"
+    return body_scene(title, build_state(body, scrambled), parameters, step, health, steps=240)

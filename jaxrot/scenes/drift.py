@@ -14,9 +14,11 @@ from jax.typing import ArrayLike
 
 from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation, refine_rotation
 from jaxrot._compiled import exportable
-from jaxrot.scenes import cycles
+from jaxrot.scenes import cycles, rotations
+from jaxrot.scenes.checks import check
 from jaxrot.scenes.cycles import Cycle
 from jaxrot.scenes.free_top import tumbling_rates
+from jaxrot.scenes.rotations import angle_between, product
 from jaxrot.scenes.scene import Scene
 
 # The columns of `drift`: a name, the repair, and the number of products between repairs.
@@ -33,28 +35,18 @@ _MAGNIFIED = 50  # the deviation in its pictures: without repair it is a twentie
 
 @exportable
 class State(NamedTuple):
-    """The orientations of any number of bodies.
+    """The orientations of any number of bodies."""
 
-    Attributes:
-        rotation: From the body's axes to space, shape (..., 3, 3).
-        step_count: The number of steps so far, int32, shape (): one for all bodies.
-    """
-
-    rotation: jax.Array
-    step_count: jax.Array
+    rotation: jax.Array  # From the body's axes to space, shape (..., 3, 3)
+    step_count: jax.Array  # The number of steps so far, int32, shape (): one for all bodies
 
 
 @exportable
 class Parameters(NamedTuple):
-    """The increments of the rotation, a cycle that repeats.
+    """The increments of the rotation, a cycle that repeats."""
 
-    Attributes:
-        increments: The rotations of the steps, in the body's axes, shape (period, ..., 3, 3).
-        cycle: The same cycle in the form that the reference needs.
-    """
-
-    increments: jax.Array
-    cycle: Cycle
+    increments: jax.Array  # The rotations of the steps, in the body's axes, shape (period, ..., 3, 3)
+    cycle: Cycle  # The same cycle in the form that the reference needs
 
 
 def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -> tuple[State, Parameters]:
@@ -64,8 +56,8 @@ def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -
     So the deviation from it is caused only by the repair and by the rounding of the products.
 
     Args:
-        rates: Body rates ω of every step of a cycle, rad/s, shape (period, ..., 3); a constant rate has the period 1.
-        time_step: Δt, s, shape () or (...).
+        rates: Body rates ω of every step of a cycle, shape (period, ..., 3), rad/s; a constant rate has the period 1.
+        time_step: Δt, shape () or (...), s.
         dtype: Of the rotations, float32 or float64.
 
     Raises:
@@ -75,12 +67,10 @@ def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -
     w, h = np.asarray(rates, dtype=np.float64), np.asarray(time_step, dtype=np.float64)
     if w.ndim < 2 or w.shape[-1] != 3 or w.size == 0:
         raise ValueError(f"rates must have shape (period, ..., 3), none of them 0; got {w.shape}")
-    if not np.all(np.isfinite(w)):
-        raise ValueError("rates must be finite; got NaN or inf")
+    check("finite", rates=w)
     if h.shape not in ((), w.shape[1:-1]):
         raise ValueError(f"time_step must have shape () or {w.shape[1:-1]}, that of the bodies; got {h.shape}")
-    if not np.all(np.isfinite(h) & (h > 0)):
-        raise ValueError(f"time_step must be finite and positive; got {time_step}")
+    check("finite and > 0", time_step=h)
     vectors = w * h[..., None]
     angle = np.max(np.linalg.norm(vectors, axis=-1))
     if angle >= np.pi / 2:
@@ -113,7 +103,7 @@ def step(state: State, parameters: Parameters, *, repair: str | None = DEFAULT_M
         raise ValueError(f"repair must be None or one of {', '.join(sorted(METHODS))}; got {repair!r}")
     if not isinstance(every, int) or every < 1:
         raise ValueError(f"every must be a static integer, 1 or more; got {every}")
-    rotation = _product(state.rotation, parameters.increments[state.step_count % len(parameters.increments)])
+    rotation = product(state.rotation, parameters.increments[state.step_count % len(parameters.increments)])
     count = state.step_count + 1
     if repair is not None and every == 1:
         rotation = nearest_rotation(rotation, method=repair)
@@ -139,13 +129,12 @@ def orientation_error(state: State, parameters: Parameters) -> jax.Array:
     exact = jnp.broadcast_to(reference(state, parameters), state.rotation.shape)
     # Three steps from the reference are enough: `newton` converges cubically from any start.
     nearest = refine_rotation(state.rotation, exact, step="newton", iterations=3)
-    return 2 * jnp.arcsin(jnp.minimum(jnp.sqrt(_sum_of_squares(nearest - exact) / 8), 1))
+    return angle_between(nearest, exact)
 
 
 def orthonormality_error(state: State) -> jax.Array:
     """‖RᵀR − 1‖_F, without unit, shape (...)."""
-    square = _product(jnp.swapaxes(state.rotation, -1, -2), state.rotation)
-    return jnp.sqrt(_sum_of_squares(square - jnp.broadcast_to(jnp.eye(3, dtype=square.dtype), square.shape)))
+    return rotations.orthonormality_error(state.rotation)
 
 
 def drift() -> Scene:
@@ -164,9 +153,9 @@ def drift() -> Scene:
 
     def health(states: tuple[State, ...]) -> dict[str, jax.Array]:
         together = State(jnp.stack([state.rotation for state in states]), states[0].step_count)
-        orientation, orthonormality = orientation_error(together, parameters), orthonormality_error(together)
-        watched = {f"orientation error, {shown[0]} (rad)": orientation[i] for i, shown in enumerate(_SHOWN)}
-        return watched | {f"orthonormality error, {shown[0]} (1)": orthonormality[i] for i, shown in enumerate(_SHOWN)}
+        watched = {"orientation error, {} (rad)": orientation_error(together, parameters)}
+        watched |= {"orthonormality error, {} (1)": orthonormality_error(together)}
+        return {key.format(shown[0]): errors[i] for key, errors in watched.items() for i, shown in enumerate(_SHOWN)}
 
     def points(states: tuple[State, ...]) -> jax.Array:
         exact = reference(states[0], parameters)
@@ -180,14 +169,4 @@ def drift() -> Scene:
     lines = np.array([(4 * i, 4 * i + axis) for i in range(len(_SHOWN) + 1) for axis in (1, 2, 3)])
     names = ", ".join(name for name, _, _ in _SHOWN)
     title = f"Drift of a tumbling top, deviation x{_MAGNIFIED}: {names}; above: exact"
-    return Scene(title, (start,) * len(_SHOWN), frame, health, points, lines, float(_PRODUCTS * time_step), 1000)
-
-
-def _product(a: jax.Array, b: jax.Array) -> jax.Array:
-    """The matrix product by elementwise products: an accelerator would round the factors of `@` to TF32, 1e-3."""
-    x, y, z = (a[..., :, i, None] * b[..., i, None, :] for i in range(3))
-    return x + y + z
-
-
-def _sum_of_squares(matrix: jax.Array) -> jax.Array:
-    return jnp.sum(matrix * matrix, axis=(-2, -1))
+    return Scene(title, (start,) * len(_SHOWN), frame, health, points, float(_PRODUCTS * time_step), 1000, lines)

@@ -1,18 +1,19 @@
 """A soft body that falls onto a block and rolls off it: Müller et al. 2016, Fig. 6."""
 
+import functools
+
 import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jaxrot.scenes.body import build_two_scale_body, checked_vertices
+from jaxrot.scenes.body import build_two_scale_body
+from jaxrot.scenes.checks import checked_vertices
 from jaxrot.scenes.contact import build_contact
 from jaxrot.scenes.dragon import standing_vertices
-from jaxrot.scenes.scene import Scene
+from jaxrot.scenes.scene import Scene, body_scene
 from jaxrot.scenes.shape_health import health
 from jaxrot.scenes.shape_matching import build_parameters, build_state, step
 
-STEP_SECONDS = 1 / 120
-GRAVITY = 9.81
 # In metres, for a body with a diagonal of one metre.
 ROOM = ((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
 BLOCK = ((-0.8, -0.4, -0.1), (-0.1, 0.4, 0.25))
@@ -30,25 +31,13 @@ def drop(mesh_vertices: ArrayLike | None = None) -> Scene:
     body = build_two_scale_body(_one_metre(standing_vertices() if mesh_vertices is None else mesh_vertices))
     contact = build_contact(ground_height=0.0, box=ROOM, obstacle=BLOCK, restitution=0.1, friction=0.4)
     parameters = build_parameters(
-        body,
-        time_step=STEP_SECONDS,
-        stiffness=0.3,
-        damping=0.05,
-        gravity=(0.0, 0.0, -GRAVITY),
-        contact=contact,
+        body, time_step=1 / 120, stiffness=0.3, damping=0.05, gravity=(0.0, 0.0, -9.81), contact=contact
     )
     lowest = float(jnp.min(body.rest_positions[:, 2]))
     start = body.rest_positions + jnp.asarray([0.0, 0.0, 0.75 - lowest], body.rest_positions.dtype)[None]
-    return Scene(
-        title="A soft dragon dropped onto a block" if mesh_vertices is None else "A soft body dropped onto a block",
-        state=build_state(body, start),
-        step=lambda state: step(state, parameters, ground=True, box=True, obstacle=True),
-        health=lambda state: health(state, parameters),
-        points=lambda state: jnp.asarray(state.positions),
-        lines=np.empty((0, 2), dtype=np.intp),
-        step_seconds=STEP_SECONDS,
-        steps=240,
-    )
+    title = f"A soft {'dragon' if mesh_vertices is None else 'body'} dropped onto a block"
+    falling = functools.partial(step, ground=True, box=True, obstacle=True)
+    return body_scene(title, build_state(body, start), parameters, falling, health, steps=240)
 
 
 def _one_metre(vertices: ArrayLike) -> np.ndarray:

@@ -17,28 +17,22 @@ import jax.numpy as jnp
 
 from jaxrot import nearest_rotation, refine_rotation, twist_modes
 from jaxrot._compiled import exportable
+from jaxrot.scenes.incidence import sum_at_vertices
+from jaxrot.scenes.rotations import product
 
 
 @exportable
 class Elements(NamedTuple):
-    """Linear tetrahedra.
+    """Linear tetrahedra."""
 
-    Attributes:
-        corners: Vertex indices, shape (m, 4).
-        incidence: The positions of each vertex in `corners.ravel()`, filled up with 4 m, shape (n, largest valence).
-        rest_inverses: Inverses of the edge matrices at rest, shape (m, 3, 3), 1/m. Their rows are the gradients of the
-            linear functions that are 1 at corners 1, 2 and 3.
-        volumes: At rest, shape (m,), m³.
-        shear_modulus: μ, Lamé's second parameter, shape (m,), Pa.
-        lame_first: λ, Lamé's first parameter, shape (m,), Pa.
-    """
-
-    corners: jax.Array
-    incidence: jax.Array
+    corners: jax.Array  # Vertex indices, shape (m, 4)
+    incidence: jax.Array  # The places of each vertex in `corners.ravel()`, filled up with 4 m, shape (n, k)
+    # Inverses of the edge matrices at rest, shape (m, 3, 3), 1/m. Their rows are the gradients of the linear functions
+    # that are 1 at corners 1, 2 and 3.
     rest_inverses: jax.Array
-    volumes: jax.Array
-    shear_modulus: jax.Array
-    lame_first: jax.Array
+    volumes: jax.Array  # At rest, shape (m,), m³
+    shear_modulus: jax.Array  # μ, Lamé's second parameter, shape (m,), Pa
+    lame_first: jax.Array  # λ, Lamé's first parameter, shape (m,), Pa
 
 
 def lame_parameters(young: Any, poisson: Any) -> tuple[Any, Any]:
@@ -51,35 +45,25 @@ def deformation_gradients(positions: jax.Array, elements: Elements) -> jax.Array
     corners = positions.at[elements.corners].get(mode="promise_in_bounds")
     # Take the differences first: far from the origin a sum over the four corners would cancel.
     edges = corners[:, 1:] - corners[:, :1]
-    return _product(jnp.swapaxes(edges, -1, -2), elements.rest_inverses)
+    return product(jnp.swapaxes(edges, -1, -2), elements.rest_inverses)
 
 
 def nodal_gradient(stress: jax.Array, elements: Elements) -> jax.Array:
     """Returns Σ V P b over the elements around each vertex, shape (n, 3): the transpose of `deformation_gradients`.
 
-    Args:
-        stress: ∂Ψ/∂F, shape (m, 3, 3), Pa. The result is then ∂E/∂x, the negative force, N.
-        elements: The elements.
+    For the stress P = ∂Ψ/∂F, Pa, it is ∂E/∂x, the negative force, N.
     """
     scaled = stress * elements.volumes[:, None, None]
     # Row a is the product of the stress and the gradient of the linear function of corner a.
     others = jnp.sum(elements.rest_inverses[:, :, None, :] * scaled[:, None, :, :], axis=-1)
-    corners = jnp.concatenate([-jnp.sum(others, axis=1, keepdims=True), others], axis=1).reshape(-1, 3)
-    return jnp.sum(corners.at[elements.incidence].get(mode="fill", fill_value=0), axis=1)
+    corners = jnp.concatenate([-jnp.sum(others, axis=1, keepdims=True), others], axis=1)
+    return sum_at_vertices(corners, elements.incidence)
 
 
 def element_rotations(
     gradients: jax.Array, rotations: jax.Array, *, rotation: str, iterations: int | None
 ) -> jax.Array:
-    """Returns the rotation of each element.
-
-    Args:
-        gradients: F, shape (m, 3, 3).
-        rotations: The warm start, shape (m, 3, 3).
-        rotation: A name in `jaxrot.STEPS`, or, if `iterations` is None, in `jaxrot.METHODS`.
-        iterations: Steps from the warm start. 0 keeps it, which from the identity is linear elasticity. None: a cold
-            start.
-    """
+    """Returns the rotation of each element. `rotation` and `iterations` are as in `corotational.step`."""
     if iterations is None:
         return nearest_rotation(gradients, method=rotation)
     return refine_rotation(gradients, rotations, step=rotation, iterations=iterations) if iterations else rotations
@@ -108,22 +92,17 @@ def held_tangent(rotations: jax.Array, elements: Elements) -> Callable[[jax.Arra
     Source: Müller and Gross 2004.
     """
 
-    def product(gradients_dot: jax.Array) -> jax.Array:
+    def apply(gradients_dot: jax.Array) -> jax.Array:
         return _rotated(_symmetric_part(gradients_dot, rotations), rotations, elements)
 
-    return product
+    return apply
 
 
 def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements) -> Callable[[jax.Array], jax.Array]:
     """Returns the map from Ḟ to Ṗ with R's derivative: 2 μ (Ḟ − Ṙ) + λ ((R:Ḟ) R + (tr S − 3) Ṙ).
 
-    With it Newton's method converges quadratically near a stable equilibrium. In compression it has negative
-    eigenvalues.
-
-    Args:
-        gradients: F, shape (m, 3, 3).
-        rotations: R, converged, shape (m, 3, 3).
-        elements: The elements.
+    R must have converged. With it Newton's method converges quadratically near a stable equilibrium. In compression
+    it has negative eigenvalues.
     """
     shear = 2 * elements.shear_modulus[:, None, None]
     # With 0 iterations `refine_rotation` only applies the derivative rule at R. `jax.linearize` computes its inverses
@@ -131,12 +110,12 @@ def exact_tangent(gradients: jax.Array, rotations: jax.Array, elements: Elements
     _, turned = jax.linearize(lambda f: refine_rotation(f, rotations, iterations=0), gradients)
     pressure = (elements.lame_first * _trace(_strain(gradients, rotations)))[:, None, None]
 
-    def product(gradients_dot: jax.Array) -> jax.Array:
+    def apply(gradients_dot: jax.Array) -> jax.Array:
         rotations_dot = turned(gradients_dot)
         trace = elements.lame_first * jnp.sum(rotations * gradients_dot, axis=(-2, -1))
         return shear * gradients_dot + (pressure - shear) * rotations_dot + trace[:, None, None] * rotations
 
-    return product
+    return apply
 
 
 def projected_tangent(
@@ -147,11 +126,6 @@ def projected_tangent(
     R turns only in the three twist modes T: Ṙ = Σ 2/(sᵢ+sⱼ) T (T:Ḟ). `held_tangent` has no stiffness in these modes.
     The exact (geometric) stiffness is 2 μ − (2 μ − λ (tr S − 3)) 2/(sᵢ+sⱼ). A negative one is replaced by 0.
 
-    Args:
-        gradients: F, shape (m, 3, 3).
-        rotations: R, converged, shape (m, 3, 3).
-        elements: The elements.
-
     Source: Smith, de Goes and Kim 2019, section 4.
     """
     held = held_tangent(rotations, elements)
@@ -160,11 +134,11 @@ def projected_tangent(
     turning = shear - elements.lame_first * _trace(_strain(gradients, rotations))
     stiffness = jnp.maximum(shear[:, None] - turning[:, None] * eigenvalues, 0)
 
-    def product(gradients_dot: jax.Array) -> jax.Array:
+    def apply(gradients_dot: jax.Array) -> jax.Array:
         twist = stiffness * jnp.sum(modes * gradients_dot[:, None], axis=(-2, -1))
         return held(gradients_dot) + jnp.sum(twist[:, :, None, None] * modes, axis=1)
 
-    return product
+    return apply
 
 
 def stiffness_diagonal(elements: Elements) -> jax.Array:
@@ -176,8 +150,7 @@ def stiffness_diagonal(elements: Elements) -> jax.Array:
     first = jnp.sum(jnp.sum(inverses, axis=1) ** 2, axis=-1, keepdims=True)
     squares = jnp.concatenate([first, jnp.sum(inverses**2, axis=-1)], axis=1)
     factor = elements.volumes * (4 * elements.shear_modulus + elements.lame_first) / 3
-    corners = (factor[:, None] * squares).reshape(-1)
-    return jnp.sum(corners.at[elements.incidence].get(mode="fill", fill_value=0), axis=1)
+    return sum_at_vertices(factor[:, None] * squares, elements.incidence)
 
 
 def _strain(gradients: jax.Array, rotations: jax.Array) -> jax.Array:
@@ -187,21 +160,15 @@ def _strain(gradients: jax.Array, rotations: jax.Array) -> jax.Array:
 
 def _symmetric_part(gradients: jax.Array, rotations: jax.Array) -> jax.Array:
     """sym(RᵀF)."""
-    product = _product(jnp.swapaxes(rotations, -1, -2), gradients)
-    return 0.5 * (product + jnp.swapaxes(product, -1, -2))
+    stretch = product(jnp.swapaxes(rotations, -1, -2), gradients)
+    return 0.5 * (stretch + jnp.swapaxes(stretch, -1, -2))
 
 
 def _rotated(strain: jax.Array, rotations: jax.Array, elements: Elements) -> jax.Array:
     """R (2 μ ε + λ tr(ε) 1)."""
-    shear = 2 * elements.shear_modulus[:, None, None] * _product(rotations, strain)
+    shear = 2 * elements.shear_modulus[:, None, None] * product(rotations, strain)
     return shear + (elements.lame_first * _trace(strain))[:, None, None] * rotations
 
 
 def _trace(matrices: jax.Array) -> jax.Array:
     return matrices[:, 0, 0] + matrices[:, 1, 1] + matrices[:, 2, 2]
-
-
-def _product(a: jax.Array, b: jax.Array) -> jax.Array:
-    """The matrix product by elementwise products: an accelerator rounds `@` and `einsum` to TF32."""
-    x, y, z = (a[:, :, i, None] * b[:, i, None, :] for i in range(3))
-    return x + y + z

@@ -3,17 +3,19 @@
 A scatter is slow on a processor, and adds in an order that is not fixed on an accelerator.
 """
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 
 def incidence(
     members: np.ndarray, vertex_count: int, *, filled: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Every place of every vertex in the members of groups: clusters, or the corners of tetrahedra.
+    """Returns every place of every vertex in the members of groups: clusters, or the corners of tetrahedra.
 
     Args:
         members: Vertex indices, shape (c, s).
-        vertex_count: How many vertices there are, n.
+        vertex_count: The number n of vertices.
         filled: Which places of `members` count, shape (c, s); all of them by default.
 
     Returns:
@@ -33,3 +35,10 @@ def incidence(
     places = np.full((vertex_count, counts.max()), members.size, dtype=np.int32)
     places[vertex[order], rank] = occupied[order]
     return places, counts
+
+
+def sum_at_vertices(values: jax.Array, places: jax.Array) -> jax.Array:
+    """Returns the sum over the places of each vertex, shape (n, ...), of values of shape (c, s, ...)."""
+    flat = values.reshape(-1, *values.shape[2:])
+    # Append the value of empty places. With the fill mode of a gather the cantilever's step takes 1.5 times as long.
+    return jnp.sum(jnp.concatenate([flat, jnp.zeros_like(flat[:1])])[places], axis=1)

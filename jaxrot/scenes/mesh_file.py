@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from jaxrot.scenes.checks import checked_vertices
+
 
 def read(path: Path) -> Any:
     """Returns the content of the file, a `meshio.Mesh`.
@@ -30,12 +32,5 @@ def read(path: Path) -> Any:
 
 
 def vertices(path: Path) -> np.ndarray:
-    """Returns the vertices in the file, float64 of shape (n, 3).
-
-    Raises:
-        ValueError: It cannot be read, or has none.
-    """
-    points = np.asarray(read(path).points, dtype=np.float64)
-    if not len(points) or points.shape[1] != 3:
-        raise ValueError(f"the mesh has no vertices in space; its points have shape {points.shape}")
-    return points
+    """Returns the vertices in the file, or raises a ValueError."""
+    return checked_vertices(read(path).points)

@@ -27,44 +27,33 @@ class Choices(NamedTuple):
 
 @exportable
 class Problem(NamedTuple):
-    """The potential ½ Σ c |u|² − uᵀf + E(x + u) of a displacement u.
+    """The potential ½ Σ c |u|² − uᵀf + E(x + u) of a displacement u."""
 
-    Attributes:
-        elements: The elements, with the energy E.
-        start: x, shape (n, 3), m.
-        inertia: c, shape (n,), kg/s².
-        load: f, shape (n, 3), N.
-        free: 1 for a vertex that moves, 0 for a fixed one, shape (n,).
-    """
-
-    elements: Elements
-    start: jax.Array
-    inertia: jax.Array
-    load: jax.Array
-    free: jax.Array
+    elements: Elements  # The elements, with the energy E
+    start: jax.Array  # x, shape (n, 3), m
+    inertia: jax.Array  # c, shape (n,), kg/s²
+    load: jax.Array  # f, shape (n, 3), N
+    free: jax.Array  # 1 for a vertex that moves, 0 for a fixed one, shape (n,)
 
 
 def minimise(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[jax.Array, jax.Array]:
     """Returns the displacement after a fixed number of Newton iterations from 0, and the rotations at the last one."""
-
-    def iteration(_: int, carry: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        return _newton_iteration(problem, *carry, choices)[:2]
-
-    carry = (jnp.zeros_like(problem.start), rotations)
     if choices.newton_iterations == 1:
-        return iteration(0, carry)
-    return lax.fori_loop(0, choices.newton_iterations, iteration, carry)
+        return _newton_iteration(problem, jnp.zeros_like(problem.start), rotations, choices)[:2]
+    return _iterate(problem, rotations, choices)[0]
 
 
 def residuals(problem: Problem, rotations: jax.Array, choices: Choices) -> jax.Array:
     """Returns the norm of the potential's gradient before each iteration, shape (newton_iterations,), N."""
+    return _iterate(problem, rotations, choices)[1]
 
+
+def _iterate(problem: Problem, rotations: jax.Array, choices: Choices) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
     def iteration(carry: tuple[jax.Array, jax.Array], _: None) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
         displacement, rotations, force = _newton_iteration(problem, *carry, choices)
         return (displacement, rotations), jnp.sqrt(jnp.sum(force**2))
 
-    carry = (jnp.zeros_like(problem.start), rotations)
-    return lax.scan(iteration, carry, length=choices.newton_iterations)[1]
+    return lax.scan(iteration, (jnp.zeros_like(problem.start), rotations), length=choices.newton_iterations)
 
 
 def _newton_iteration(

@@ -6,19 +6,15 @@ import jax.numpy as jnp
 from jaxrot import nearest_rotation, rotation_gap
 from jaxrot._algebra.scaling import safe_divide
 from jaxrot.scenes.balance import cross
+from jaxrot.scenes.rotations import orthonormality_error
 from jaxrot.scenes.shape_matching import Parameters, State, fit_clusters, turned_offsets
 
 
 def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
     """Returns energies, momenta, the smallest gap and worst defect of the rotations, and the error of the shape.
 
-    Args:
-        state: The state now.
-        parameters: Of the same dtype.
-
-    Returns:
-        Scalars by name. The elastic energy is α/(2h²) Σ m |g − x|²; its gradient is the force towards the goals. The
-        angular momentum is about the centre of mass.
+    The elastic energy is α/(2h²) Σ m |g − x|²; its gradient is the force towards the goals. The angular momentum is
+    about the centre of mass.
     """
     body = parameters.body
     masses = body.masses[:, None]
@@ -30,15 +26,13 @@ def health(state: State, parameters: Parameters) -> dict[str, jax.Array]:
     away = jnp.sum((turned_offsets(state.rotations, body) - fit.arms) ** 2, axis=-1)
     part = body.masses / body.cluster_counts
     elastic = jnp.sum(jnp.where(body.shares > 0, part[body.members], jnp.zeros_like(body.shares)) * away)
-    gram = jnp.sum(state.rotations[..., :, :, None] * state.rotations[..., :, None, :], axis=-3)
-    defect = gram - jnp.eye(3, dtype=gram.dtype)[None]
     return {
         "kinetic energy (J)": 0.5 * jnp.sum(masses * state.velocities**2),
         "elastic energy (J)": 0.5 * parameters.stiffness / parameters.time_step**2 * elastic,
         "linear momentum (kg m/s)": _length(momentum),
         "angular momentum (kg m²/s)": _length(jnp.sum(masses * cross(arms, relative), axis=0)),
         "smallest rotation gap": jnp.min(rotation_gap(fit.matrices)),
-        "worst orthogonality": jnp.max(jnp.sqrt(jnp.sum(defect**2, axis=(-2, -1)))),
+        "worst orthogonality": jnp.max(orthonormality_error(state.rotations)),
         "shape error (of the diagonal)": shape_error(state.positions, body.rest_positions),
     }
 

@@ -17,58 +17,31 @@ from jax.typing import ArrayLike
 from jaxrot import nearest_rotation, refine_rotation
 from jaxrot._compiled import exportable
 from jaxrot.scenes.balance import without_momentum
-from jaxrot.scenes.body import Body, checked_vertices
+from jaxrot.scenes.body import Body
+from jaxrot.scenes.checks import check, check_gravity, checked_vertices
 from jaxrot.scenes.contact import Contact, Motion, build_contact, stand_on_ground, stay_in_box, stay_out_of_obstacle
-
-
-@exportable
-class State(NamedTuple):
-    """The state of the body.
-
-    Attributes:
-        positions: Of the vertices, m, shape (n, 3).
-        velocities: Of the vertices, m/s, shape (n, 3).
-        rotations: Of the clusters, from rest, shape (c, 3, 3): the warm start of the next step.
-    """
-
-    positions: jax.Array
-    velocities: jax.Array
-    rotations: jax.Array
+from jaxrot.scenes.incidence import sum_at_vertices
+from jaxrot.scenes.scene import BodyState as State
 
 
 @exportable
 class Parameters(NamedTuple):
-    """The parameters, which a step does not change.
+    """The parameters, which a step does not change."""
 
-    Attributes:
-        body: The shape at rest, the masses and the clusters.
-        time_step: s, shape ().
-        stiffness: The fraction of the way to its goal that a vertex moves in a step, 0 to 1, shape ().
-        damping: The fraction that a step removes of the velocities relative to the clusters' rigid motions, 0 to 1,
-            shape ().
-        gravity: m/s², shape (3,).
-        contact: The obstacles, and how vertices respond to them.
-    """
-
-    body: Body
-    time_step: jax.Array
-    stiffness: jax.Array
-    damping: jax.Array
-    gravity: jax.Array
-    contact: Contact
+    body: Body  # The shape at rest, the masses and the clusters
+    time_step: jax.Array  # Shape (), s
+    stiffness: jax.Array  # The fraction of the way to its goal that a vertex moves in a step, 0 to 1, shape ()
+    damping: jax.Array  # The fraction a step removes of velocities relative to the clusters' rigid motions, 0 to 1
+    gravity: jax.Array  # Shape (3,), m/s²
+    contact: Contact  # The obstacles, and how vertices respond to them
 
 
 @exportable
 class ClusterFit(NamedTuple):
-    """The positions of the vertices relative to their clusters, and the matrices whose rotations are extracted.
+    """The positions of the vertices relative to their clusters, and the matrices whose rotations are extracted."""
 
-    Attributes:
-        arms: Places from their cluster's centre of mass, m, shape (c, s, 3).
-        matrices: A_pq over the cluster's mass, m², shape (c, 3, 3).
-    """
-
-    arms: jax.Array
-    matrices: jax.Array
+    arms: jax.Array  # Places from their cluster's centre of mass, shape (c, s, 3), m
+    matrices: jax.Array  # A_pq over the cluster's mass, shape (c, 3, 3), m²
 
 
 def build_parameters(
@@ -86,13 +59,9 @@ def build_parameters(
         ValueError: A time step that is not positive, a stiffness or damping outside 0 to 1, a gravity that is no finite
             vector.
     """
-    if not (np.isfinite(time_step) and time_step > 0):
-        raise ValueError(f"time_step must be positive and finite; got {time_step}")
-    for name, value in (("stiffness", stiffness), ("damping", damping)):
-        if not 0 <= value <= 1:
-            raise ValueError(f"{name} must be from 0 to 1; got {value}")
-    if np.shape(gravity) != (3,) or not np.isfinite(np.asarray(gravity)).all():
-        raise ValueError(f"gravity must be three finite numbers; got {gravity}")
+    check("finite and > 0", time_step=time_step)
+    check("from 0 to 1", stiffness=stiffness, damping=damping)
+    check_gravity(gravity)
     dtype = body.masses.dtype
     h, alpha, c, g = (jnp.asarray(value, dtype) for value in (time_step, stiffness, damping, gravity))
     return Parameters(body, h, alpha, c, g, build_contact(dtype=dtype.type) if contact is None else contact)
@@ -217,8 +186,4 @@ def turned_offsets(rotations: jax.Array, body: Body) -> jax.Array:
 
 def mean_over_clusters(changes: jax.Array, body: Body) -> jax.Array:
     """Returns for every vertex the mean of the changes in its clusters: (c, s, 3) to (n, 3)."""
-    # Gather through the table of places. A scatter takes XLA:CPU several times as long, and has no fixed order of sums.
-    rows = changes.reshape(-1, 3)
-    nowhere = jnp.zeros((1, 3), changes.dtype)
-    gathered = jnp.concatenate([rows, nowhere])[body.places]
-    return jnp.sum(gathered, axis=1) / body.cluster_counts[:, None]
+    return sum_at_vertices(changes, body.places) / body.cluster_counts[:, None]

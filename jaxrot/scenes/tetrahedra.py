@@ -7,31 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxrot.scenes import mesh_file
-from jaxrot.scenes.scene import LARGEST_COORDINATE
+from jaxrot.scenes.checks import checked_vertices
 
 _CORNERS = 4
 
 
 class Mesh(NamedTuple):
-    """A mesh of tetrahedra.
+    """A mesh of tetrahedra."""
 
-    Attributes:
-        vertices: At rest, float64 of shape (n, 3), m.
-        tetrahedra: Vertex indices, shape (m, 4); the volume of each is positive once `checked`.
-    """
-
-    vertices: np.ndarray
-    tetrahedra: np.ndarray
+    vertices: np.ndarray  # At rest, float64 of shape (n, 3), m
+    tetrahedra: np.ndarray  # Vertex indices, shape (m, 4); the volume of each is positive once `checked`
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
-    """Returns a box from the origin; each cell is divided into six tetrahedra around its diagonal.
+    """Returns a box from the origin, `size` long (m); each cell is divided into six tetrahedra around its diagonal.
 
     The tetrahedra of neighbouring cells match without alternating patterns (Kuhn 1960).
-
-    Args:
-        cells: Number of cells along each axis, at least 1.
-        size: Lengths of the box, m.
     """
     if min(cells) < 1 or not all(np.isfinite(size)) or min(size) <= 0:
         raise ValueError(f"a box needs at least one cell and a positive length along each axis; got {cells} and {size}")
@@ -68,39 +59,28 @@ def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
         ValueError: No tetrahedra, wrong shapes, an index out of range, a vertex that is not finite, too far away or in
             no tetrahedron, a flat tetrahedron.
     """
-    vertices, tetrahedra = np.asarray(vertices), np.asarray(tetrahedra)
+    tetrahedra = np.asarray(tetrahedra)
     if tetrahedra.size == 0:
         raise ValueError("the mesh has no tetrahedra")
     if tetrahedra.ndim != 2 or tetrahedra.shape[1] != _CORNERS or not np.issubdtype(tetrahedra.dtype, np.integer):
         raise ValueError(
             f"tetrahedra must be integers of shape (m, 4); got {tetrahedra.dtype} of shape {tetrahedra.shape}"
         )
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise ValueError(f"vertices must have shape (n, 3); got {vertices.shape}")
-    if not np.isfinite(vertices).all():
-        index = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
-        raise ValueError(f"vertex {index} is not finite: {vertices[index].tolist()}")
-    largest = np.abs(vertices).max()
-    if largest > LARGEST_COORDINATE:
-        raise ValueError(f"vertices must be at most {LARGEST_COORDINATE:g} from the origin; got {largest:.3g}")
+    vertices = checked_vertices(vertices)
     if tetrahedra.min() < 0 or tetrahedra.max() >= len(vertices):
         raise ValueError(f"a tetrahedron names a vertex outside 0 to {len(vertices) - 1}")
     alone = np.setdiff1d(np.arange(len(vertices)), tetrahedra)
     if len(alone):
         raise ValueError(f"vertex {alone[0]} belongs to no tetrahedron, it would have no mass")
-    mesh = _with_positive_volumes(Mesh(vertices.astype(np.float64), tetrahedra.astype(np.int32)))
+    mesh = Mesh(vertices, tetrahedra.astype(np.int32))
+    is_negative = np.linalg.det(edge_matrices(mesh)) < 0
+    mesh = mesh._replace(tetrahedra=np.where(is_negative[:, None], mesh.tetrahedra[:, [0, 1, 3, 2]], mesh.tetrahedra))
     edges = edge_matrices(mesh)
     # Compare with the longest edge, so that the limit does not depend on the unit of length.
     flat = np.linalg.det(edges) <= 1e-9 * np.linalg.norm(edges, axis=-2).max(axis=-1) ** 3
     if flat.any():
         raise ValueError(f"tetrahedron {int(np.argmax(flat))} is flat, {int(flat.sum())} of {len(flat)} are")
     return mesh
-
-
-def _with_positive_volumes(mesh: Mesh) -> Mesh:
-    negative = np.linalg.det(edge_matrices(mesh)) < 0
-    swapped = mesh.tetrahedra[:, [0, 1, 3, 2]]
-    return mesh._replace(tetrahedra=np.where(negative[:, None], swapped, mesh.tetrahedra))
 
 
 def edge_matrices(mesh: Mesh) -> np.ndarray:

@@ -4,7 +4,7 @@ Source: Müller et al. 2016, section 4. The paper gives no shape. The deformatio
 angle between the path and the normal of the base.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,9 +13,11 @@ from jax import lax
 from jax.typing import ArrayLike
 
 from jaxrot import nearest_rotation, refine_rotation, rotation_gap
-from jaxrot._algebra.scaling import safe_sqrt
 from jaxrot._compiled import exportable
-from jaxrot.scenes.scene import LARGEST_COORDINATE, Scene
+from jaxrot.scenes.checks import checked_vertices
+from jaxrot.scenes.rotations import angle_between as angle_between
+from jaxrot.scenes.rotations import orthonormality_error
+from jaxrot.scenes.scene import Scene
 
 SPIKE = -0.66  # det F where Fig. 4 has its spike
 SLANT = 0.5 * float(np.arccos(-SPIKE))  # where the rotation turns fastest at that determinant, −cos 2θ
@@ -26,38 +28,27 @@ _FRAMES = 320
 
 @exportable
 class State(NamedTuple):
-    """The rotation of one frame.
+    """The rotation of one frame."""
 
-    Attributes:
-        rotation: Extracted in this frame, the start of the next one, shape (3, 3).
-        frame: The number of the frame, int32, shape ().
-    """
-
-    rotation: jax.Array
-    frame: jax.Array
+    rotation: jax.Array  # Extracted in this frame, the start of the next one, shape (3, 3)
+    frame: jax.Array  # The number of the frame, int32, shape ()
 
 
 @exportable
 class Parameters(NamedTuple):
-    """The tetrahedron and the path of its tip, which a step does not change.
+    """The tetrahedron and the path of its tip, which a step does not change."""
 
-    Attributes:
-        tip_path: The tip in every frame, m, shape (frames, 3). It stays where it is after the last.
-        base: The three fixed vertices, m, shape (3, 3), a vertex a row.
-        shape: The factor of A = edges · shape for the edges [x₁−x₀ x₂−x₀ x₃−x₀], shape (3, 3). For the deformation
-            gradient it is the inverse of the edges at rest, 1/m; for shape matching that times Σ x̄ x̄ᵀ, m.
-    """
-
-    tip_path: jax.Array
-    base: jax.Array
+    tip_path: jax.Array  # The tip in every frame, shape (frames, 3), m. It stays where it is after the last.
+    base: jax.Array  # The three fixed vertices, shape (3, 3), a vertex a row, m
+    # The factor of A = edges · shape for the edges [x₁−x₀ x₂−x₀ x₃−x₀], shape (3, 3). For the deformation gradient it
+    # is the inverse of the edges at rest, 1/m; for shape matching that times Σ x̄ x̄ᵀ, m.
     shape: jax.Array
 
 
 def slanted_tetrahedron(slant: float = SLANT, radius: float = RADIUS) -> np.ndarray:
-    """A regular base around the origin, its normal off the x-axis by the slant (rad), and the tip at (1, 0, 0).
+    """Returns vertices of shape (4, 3), the tip at (1, 0, 0) last.
 
-    Returns:
-        Vertices, the tip last, shape (4, 3).
+    The base is a regular triangle around the origin. Its normal is off the x-axis by the slant (rad).
     """
     angle = 2 * np.pi / 3 * np.arange(3)[:, None]
     base = np.cos(angle) * [-np.sin(slant), np.cos(slant), 0] + np.sin(angle) * [0.0, 0, 1]
@@ -67,10 +58,7 @@ def slanted_tetrahedron(slant: float = SLANT, radius: float = RADIUS) -> np.ndar
 def pushed_through(frames: int = _FRAMES) -> np.ndarray:
     """Returns the path of the tip on the x-axis from 1 through the base at 0 to its mirror image at −1.
 
-    For `slanted_tetrahedron` x = det F.
-
-    Returns:
-        The path, shape (frames + 1, 3).
+    It has the shape (frames + 1, 3). For `slanted_tetrahedron` x = det F.
     """
     path = np.zeros((frames + 1, 3))
     path[:, 0] = np.linspace(1, -1, frames + 1)
@@ -92,15 +80,9 @@ def build(
     Raises:
         ValueError: Wrong shape; a vertex or a place that is not finite; a flat tetrahedron; an unknown matrix.
     """
-    vertices, path = np.asarray(rest, dtype=np.float64), np.asarray(tip_path, dtype=np.float64)
-    if vertices.shape != (4, 3):
-        raise ValueError(f"rest must have shape (4, 3), a vertex a row; got {vertices.shape}")
-    if path.ndim != 2 or path.shape[1] != 3 or len(path) == 0:
-        raise ValueError(f"tip_path must have shape (frames, 3), one frame or more; got {path.shape}")
-    if not (np.all(np.isfinite(vertices)) and np.all(np.isfinite(path))):
-        raise ValueError("rest and tip_path must be finite; got NaN or inf")
-    if max(np.abs(vertices).max(), np.abs(path).max()) > LARGEST_COORDINATE:
-        raise ValueError(f"rest and tip_path must be at most {LARGEST_COORDINATE:g} from the origin")
+    if np.shape(rest) != (4, 3):
+        raise ValueError(f"rest must have shape (4, 3), a vertex a row; got {np.shape(rest)}")
+    vertices, path = checked_vertices(rest, "rest"), checked_vertices(tip_path, "tip_path")
     if matrix not in _MATRICES:
         raise ValueError(f"matrix must be one of {', '.join(_MATRICES)}; got {matrix!r}")
     edges = (vertices[1:] - vertices[0]).T
@@ -169,29 +151,15 @@ def step(
     return State(rotation, frame)
 
 
-def follow(
-    state: State,
-    parameters: Parameters,
-    *,
-    rotation_step: str = "torque",
-    iterations: int = 1,
-    escape: bool = False,
-    method: str | None = None,
-) -> jax.Array:
+def follow(state: State, parameters: Parameters, **choices: Any) -> jax.Array:
     """Returns the rotations of all frames, the first as given, shape (frames, 3, 3); options as for `step`."""
 
     def advance(now: State, _: None) -> tuple[State, jax.Array]:
-        after = step(now, parameters, rotation_step=rotation_step, iterations=iterations, escape=escape, method=method)
+        after = step(now, parameters, **choices)
         return after, after.rotation
 
     rotations = lax.scan(advance, state, None, length=len(parameters.tip_path) - 1)[1]
     return jnp.concatenate([state.rotation[None], rotations])
-
-
-def angle_between(rotation: jax.Array, other: jax.Array) -> jax.Array:
-    """Returns the angle of the rotation from one to the other, rad, shape (...)."""
-    chord = safe_sqrt(jnp.sum((rotation - other) ** 2, axis=(-2, -1)) / 8)
-    return 2 * jnp.arcsin(jnp.minimum(chord, 1))
 
 
 def tetrahedron() -> Scene:
@@ -201,13 +169,12 @@ def tetrahedron() -> Scene:
     def health(state: State) -> dict[str, jax.Array]:
         matrix = matrix_in(parameters, state.frame)
         identity = jnp.eye(3, dtype=matrix.dtype)
-        defect = jnp.sum(state.rotation[:, :, None] * state.rotation[:, None, :], axis=0) - identity
         return {
             "det F (1)": jnp.dot(jnp.cross(matrix[0], matrix[1]), matrix[2], precision="highest"),
             "gap (s2+s3)/s1 (1)": rotation_gap(matrix),
             "turned by (rad)": angle_between(state.rotation, identity),
             "distance to the nearest rotation (rad)": angle_between(state.rotation, nearest_rotation(matrix)),
-            "orthonormality error (1)": safe_sqrt(jnp.sum(defect * defect)),
+            "orthonormality error (1)": orthonormality_error(state.rotation),
         }
 
     def points(state: State) -> jax.Array:
@@ -218,4 +185,4 @@ def tetrahedron() -> Scene:
 
     lines = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3), (4, 5), (4, 6), (4, 7)])
     title = "A tetrahedron pushed through its base, one torque iteration a frame"
-    return Scene(title, start, lambda state: step(state, parameters), health, points, lines, 1 / 60, _FRAMES)
+    return Scene(title, start, lambda state: step(state, parameters), health, points, 1 / 60, _FRAMES, lines)

@@ -150,8 +150,8 @@ def test_rotations_of_a_cycle_need_no_axis():
     [
         (lambda: drift.build(np.full((1, 3), np.nan), 1), "rates must be finite"),
         (lambda: drift.build(np.zeros((1, 2)), 1), "rates must have shape"),
-        (lambda: drift.build(np.zeros((1, 3)), 0), "time_step must be finite and positive"),
-        (lambda: drift.build(np.zeros((1, 3)), -1), "time_step must be finite and positive"),
+        (lambda: drift.build(np.zeros((1, 3)), 0), "time_step must be finite and > 0"),
+        (lambda: drift.build(np.zeros((1, 3)), -1), "time_step must be finite and > 0"),
         (lambda: drift.build(np.zeros((1, 3)), [1, 1]), "time_step must have shape"),
         (lambda: drift.build(np.full((1, 3), 2), 1), "a quarter turn"),
         (lambda: drift.step(*drift.build(np.zeros((1, 3)), 1), repair="magic"), "repair must be None or one of"),

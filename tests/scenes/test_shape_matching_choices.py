@@ -42,8 +42,8 @@ def refused(body, **choices):
     [
         ("vertex 3 is", lambda body: build_two_scale_body(np.where(np.arange(24)[:, None] == 3, np.nan, POINTS))),
         ("shape", lambda body: build_two_scale_body(POINTS[:, :2])),
-        ("masses .* with 0.0", lambda body: build_two_scale_body(POINTS, np.arange(24.0))),
-        ("masses .* with -1.0", lambda body: build_two_scale_body(POINTS, -np.ones(24))),
+        ("masses .* got 0.0", lambda body: build_two_scale_body(POINTS, np.arange(24.0))),
+        ("masses .* got -1.0", lambda body: build_two_scale_body(POINTS, -np.ones(24))),
         ("cluster_size", lambda body: build_two_scale_body(POINTS, cluster_size=0)),
         ("vertex 20 is in none", lambda body: build_body(POINTS, [range(20)])),
         ("cluster 1", lambda body: build_body(POINTS, [range(24), [24]])),

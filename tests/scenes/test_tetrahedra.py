@@ -42,7 +42,7 @@ def test_either_orientation_is_taken_at_any_unit(scale):
         (UNIT, ONE[:, :3], "tetrahedra must be integers of shape"),
         (UNIT, ONE.astype(float), "tetrahedra must be integers of shape"),
         (UNIT[:, :2], ONE, "vertices must have shape"),
-        (np.where(UNIT == 1, np.nan, UNIT), ONE, "vertex 1 is not finite"),
+        (np.where(UNIT == 1, np.nan, UNIT), ONE, "vertices must be finite; vertex 1 is"),
         (UNIT, ONE + 1, "names a vertex outside 0 to 3"),
         (np.concatenate([UNIT, UNIT[:1]]), ONE, "vertex 4 belongs to no tetrahedron"),
         (UNIT * [1, 1, 0], ONE, "tetrahedron 0 is flat, 1 of 1 are"),
