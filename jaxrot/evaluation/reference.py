@@ -46,7 +46,7 @@ def solve(matrices: ArrayLike) -> Reference:
     a, exponent = _unit_scaled(matrices)
     finite = np.asarray(np.isfinite(a).all(axis=(-2, -1)))
     stretched, right = _orthogonal_columns(np.where(finite[..., None, None], a, 0))
-    lengths = _norm(stretched, axis=-2)
+    lengths = np.linalg.norm(stretched, axis=-2)
     u1 = _first_axis(stretched[..., 0], lengths[..., 0])
     u2 = _second_axis(stretched[..., 1], lengths[..., 1], u1)
     left = np.stack((u1, u2, np.cross(u1, u2)), -1)
@@ -56,7 +56,7 @@ def solve(matrices: ArrayLike) -> Reference:
     values = np.stack((lengths[..., 0], lengths[..., 1], sign * lengths[..., 2]), -1)
     right = np.stack((v1, v2, v3), -1)
     nan = np.where(finite, np.longdouble(0), np.longdouble(np.nan))
-    rotation = _product(left, np.swapaxes(right, -1, -2))
+    rotation = left @ np.swapaxes(right, -1, -2)
     return Reference(
         rotation + nan[..., None, None],
         np.ldexp(values, exponent[..., None]) + nan[..., None],
@@ -87,7 +87,7 @@ def condition(matrices: ArrayLike, *, reference: Reference | None = None) -> Flo
 def forward_error(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference | None = None) -> Float64:
     """‖R − R*‖_F. If R* is not unique: 0 at A = 0, else the distance to one of the nearest rotations."""
     reference = reference or solve(matrices)
-    distance = _norm(_finite(rotation) - reference.rotation, axis=(-2, -1))
+    distance = np.linalg.norm(_finite(rotation) - reference.rotation, axis=(-2, -1))
     # The product, unlike a selection, keeps a NaN in R at A = 0.
     return (distance * (reference.singular_values[..., 0] != 0)).astype(np.float64)
 
@@ -95,7 +95,7 @@ def forward_error(rotation: ArrayLike, matrices: ArrayLike, *, reference: Refere
 def orthogonality_error(rotation: ArrayLike) -> Float64:
     """‖RᵀR − 1‖_F, and at least 2 if det R <= 0, because RᵀR is 1 for a reflection too."""
     r = _finite(rotation)
-    defect = _norm(_product(np.swapaxes(r, -1, -2), r) - IDENTITY, axis=(-2, -1))
+    defect = np.linalg.norm(np.swapaxes(r, -1, -2) @ r - IDENTITY, axis=(-2, -1))
     determinant = _dot(np.cross(r[..., 0], r[..., 1]), r[..., 2])
     return np.where(determinant <= 0, np.maximum(defect, 2), defect).astype(np.float64)
 
@@ -104,13 +104,13 @@ def lost_trace(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference
     """(tr(R*ᵀA) − tr(RᵀA)) / s1, also if R* is not unique. Negative if R is longer than a rotation."""
     reference = reference or solve(matrices)
     best = _relative_values(matrices, reference).sum(-1)
-    return (best - _trace(_relative_stretch(rotation, matrices, reference))).astype(np.float64)
+    return (best - np.trace(_relative_stretch(rotation, matrices, reference), axis1=-2, axis2=-1)).astype(np.float64)
 
 
 def torque(rotation: ArrayLike, matrices: ArrayLike, *, reference: Reference | None = None) -> Float64:
     """‖RᵀA − AᵀR‖_F / s1, the asymmetry of the stretch: 0 at every equilibrium of the torque, such as R*."""
     stretch = _relative_stretch(rotation, matrices, reference or solve(matrices))
-    return _norm(stretch - np.swapaxes(stretch, -1, -2), axis=(-2, -1)).astype(np.float64)
+    return np.linalg.norm(stretch - np.swapaxes(stretch, -1, -2), axis=(-2, -1)).astype(np.float64)
 
 
 def _unit_scaled(matrices: ArrayLike) -> tuple[LongDouble, NDArray[np.int32]]:
@@ -132,7 +132,7 @@ def _relative_stretch(rotation: ArrayLike, matrices: ArrayLike, reference: Refer
     a, exponent = _unit_scaled(matrices)
     s1 = np.ldexp(reference.singular_values[..., 0], -exponent)[..., None, None]
     r = _finite(rotation)
-    return _product(np.swapaxes(r, -1, -2), _finite(a) / _or_one(s1))
+    return np.swapaxes(r, -1, -2) @ (_finite(a) / _or_one(s1))
 
 
 def _orthogonal_columns(a: LongDouble) -> tuple[LongDouble, LongDouble]:
@@ -154,7 +154,7 @@ def _orthogonal_columns(a: LongDouble) -> tuple[LongDouble, LongDouble]:
             columns[..., p], columns[..., q] = c * x + s * y, c * y - s * x
         if converged:
             break
-    order = np.argsort(-_norm(columns[..., :3, :], axis=-2), axis=-1, kind="stable")
+    order = np.argsort(-np.linalg.norm(columns[..., :3, :], axis=-2), axis=-1, kind="stable")
     columns = np.take_along_axis(columns, order[..., None, :], axis=-1)
     return columns[..., :3, :], columns[..., 3:, :]
 
@@ -171,9 +171,9 @@ def _second_axis(column: LongDouble, length: LongDouble, first: LongDouble) -> L
     unit = unit - first * _dot(first, unit)[..., None]
     perpendicular = IDENTITY[np.argmin(np.abs(first), axis=-1)]
     # At rank 1 the rest of the column may be rounding error, parallel to the first.
-    unit = np.where((_norm(unit, axis=-1) < 0.5)[..., None], perpendicular, unit)
+    unit = np.where((np.linalg.norm(unit, axis=-1) < 0.5)[..., None], perpendicular, unit)
     unit = unit - first * _dot(first, unit)[..., None]
-    return unit / _norm(unit, axis=-1)[..., None]
+    return unit / np.linalg.norm(unit, axis=-1)[..., None]
 
 
 def _finite(values: ArrayLike) -> LongDouble:
@@ -189,15 +189,3 @@ def _or_one(values: LongDouble) -> LongDouble:
 
 def _dot(x: LongDouble, y: LongDouble) -> LongDouble:
     return x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2]
-
-
-def _norm(values: LongDouble, axis: int | tuple[int, int]) -> LongDouble:
-    return np.sqrt((values * values).sum(axis))
-
-
-def _trace(matrix: LongDouble) -> LongDouble:
-    return matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2]
-
-
-def _product(x: LongDouble, y: LongDouble) -> LongDouble:
-    return (x[..., :, :, None] * y[..., None, :, :]).sum(-2)
