@@ -285,7 +285,7 @@ def test_times_are_measured_on_this_machine(inverted, monkeypatch):
         result = recommend(inverted, tolerance=1e-2)
     low, high = result.time_quartiles_ns
     assert 0 < low <= result.time_ns <= high < 1e5
-    assert result.batch == candidates.SMALLEST_BATCH
+    assert result.batch == sample_module.SMALLEST_BATCH
 
 
 @pytest.mark.parametrize(

@@ -20,41 +20,28 @@ from jaxrot.evaluation.ground_truth import Judged
 from jaxrot.evaluation.timing import Compiled, compile_method, time_methods
 from jaxrot.solvers import Method
 
-# The largest κ for an approximation: s2 + s3 ≥ s1. Approximations are for matrices near a rotation, κ = 1/2.
-APPROXIMATION_LIMIT = 1.0
 # The largest angle from the start to R*, in degrees, for steps that have a limit. The error of one float32 `quest` step
 # was 3e-5 from 170° off and 3e-2 from 179° off.
 FARTHEST_START = {"cayley": 90.0, "quest": 170.0}
 MOST_ITERATIONS = 8
-# A batch has the size of the sample within these limits. In smaller batches the overhead of a call dominates.
-SMALLEST_BATCH, LARGEST_BATCH = 10_000, 100_000
 TIMING_BUDGET_S = 1.0
 
 
 class Candidate(NamedTuple):
-    """A method, or a step and its number of iterations, with its measurements.
-
-    Attributes:
-        name: The method, or the step and the number of iterations.
-        method: A name in `METHODS`, or None for a step.
-        step: A name in `STEPS`, or None for a method.
-        iterations: Number of steps, or None for a method.
-        error: The largest error ‖R − R*‖_F on the sample; inf if a result is NaN or infinite.
-        time_ns: Median time a matrix in ns; NaN if it was not timed because the error is too large.
-        time_quartiles_ns: The quartiles of that time, or NaN.
-    """
+    """A method, or a step and its number of iterations, with its measurements; see `Recommendation`."""
 
     name: str
     method: str | None
     step: str | None
     iterations: int | None
-    error: float
+    error: float = np.inf
+    # NaN if it was not timed because the error is too large
     time_ns: float = np.nan
     time_quartiles_ns: tuple[float, float] = (np.nan, np.nan)
 
 
 class Measured(NamedTuple):
-    """A candidate and its compiled program for the batch size of the sample."""
+    """A candidate and its compiled program."""
 
     candidate: Candidate
     compiled: Compiled
@@ -86,38 +73,24 @@ def nearest_rotation_from_cold(matrix: ArrayLike, rotation: ArrayLike, *, method
 def outside_domain(method: Method, sample: Sample) -> str | None:
     """Returns why the domain of a method does not hold all finite matrices, in words, or None if it does.
 
-    The check uses all finite matrices in float64, not only the sample. A method is excluded, however small its error:
-
-    - if `handles_inversion` is False and some det A is negative, or 0 up to rounding.
-    - if it is exact and some κ = s1/(s2+s3) is larger than its `condition_limit`. Up to that limit it was found to keep
-      an accuracy of a few eps. A limit of 0 means at no κ: such methods are never recommended. A limit of 1/(8 eps)
-      excludes nothing.
-    - if it is an approximation and some κ > 1, that is s2+s3 < s1. Approximations are for matrices near a rotation,
-      κ = ½. They declare no limit in units of eps, because their error is not rounding.
+    The check uses all finite matrices in float64, not only the sample. A method is excluded, however small its error,
+    if a κ is larger than `domain.condition_limit`, or if some det A ≤ 0 up to rounding and it is for det A > 0.
     """
     if not method.handles_inversion and sample.n_inverted:
         return f"for det A > 0, and {sample.n_inverted:,} of {sample.finite:,} have det A < 0, or 0 to rounding"
-    limit = method.condition_limit[sample.dtype]
-    largest = sample.largest_condition
-    # At a limit this high nothing is excluded, not even matrices without a unique R*.
-    if limit >= domain.largest_condition(sample.dtype):
-        return None
-    if method.exact and limit == 0:
+    limit = domain.condition_limit(method, sample.dtype)
+    if limit == 0:
         return "exact, but for no κ does it declare an error of a few eps"
-    # Allow for rounding: the κ of a rounded rotation is 1/2 only up to a few eps.
-    rounding = 1 + 8 * float(np.finfo(sample.dtype).eps)
-    if method.exact and largest > limit * rounding:
-        return f"declared for κ ≤ {number(limit)}, and κ is up to {_larger(largest, limit)}"
-    if not method.exact and largest > APPROXIMATION_LIMIT:
-        most = APPROXIMATION_LIMIT
-        return f"an approximation for κ ≤ {number(most)}, and κ is up to {_larger(largest, most)}"
-    return None
+    if domain.is_within(sample.largest_condition, limit, sample.dtype):
+        return None
+    kind = "declared" if method.exact else "an approximation"
+    return f"{kind} for κ ≤ {number(limit)}, and κ is up to {_larger(sample.largest_condition, limit)}"
 
 
 def start_outside_domain(step: str, sample: Sample) -> str | None:
     """Returns why a step cannot start from the starts of the sample, in words, or None if it can.
 
-    `cayley` is excluded if a start is more than 90° off, `quest` from 170° on. Steps declare no κ.
+    See `FARTHEST_START`. Steps declare no κ.
     """
     farthest = FARTHEST_START.get(step)
     if sample.starts is None or farthest is None:
@@ -130,7 +103,7 @@ def start_outside_domain(step: str, sample: Sample) -> str | None:
 
 def measure_method(name: str, sample: Sample) -> Measured:
     """Compiles a method and finds its error on the sample."""
-    return _measure(Candidate(name, name, None, None, np.inf), sample)
+    return _measure(Candidate(name, name, None, None), sample)
 
 
 def measure_step(step: str, sample: Sample, largest_error: float) -> Measured:
@@ -157,7 +130,7 @@ def time_candidates(measured: list[Measured], sample: Sample) -> list[Candidate]
     timings = time_methods(
         {entry.candidate.name: entry.compiled for entry in measured},
         sample.judged.matrices,
-        batch_size(sample),
+        sample.batch,
         budget_s=TIMING_BUDGET_S,
         starts=sample.starts,
     )
@@ -167,11 +140,6 @@ def time_candidates(measured: list[Measured], sample: Sample) -> list[Candidate]
         )
         for entry in sorted(timings, key=lambda entry: entry.median_ns)
     ]
-
-
-def batch_size(sample: Sample) -> int:
-    """The number of matrices in a timed call."""
-    return min(max(sample.finite, SMALLEST_BATCH), LARGEST_BATCH)
 
 
 def undetermined(sample: Sample) -> int:
@@ -196,20 +164,20 @@ def error_on(rotation: np.ndarray, judged: Judged) -> float:
 
 def _step(step: str, iterations: int) -> Candidate:
     name = f"{step} ({iterations} iteration{'' if iterations == 1 else 's'})"
-    return Candidate(name, None, step, iterations, np.inf)
+    return Candidate(name, None, step, iterations)
 
 
 def _measure(candidate: Candidate, sample: Sample) -> Measured:
     function: Callable = apply_of(candidate, takes_previous=sample.starts is not None)
     arguments = 1 if sample.starts is None else 2
-    compiled = compile_method(function, batch_size(sample), sample.dtype, arguments=arguments)
+    compiled = compile_method(function, sample.batch, sample.dtype, arguments=arguments)
     rotation = _run(compiled, sample, sample.starts)
     return Measured(candidate._replace(error=error_on(rotation, sample.judged)), compiled)
 
 
 def _run(compiled: Compiled, sample: Sample, starts: np.ndarray | None) -> np.ndarray:
     arrays = () if starts is None else (starts,)
-    return run_in_chunks(compiled.call, sample.judged.matrices, batch_size(sample), *arrays)
+    return run_in_chunks(compiled.call, sample.judged.matrices, sample.batch, *arrays)
 
 
 def _larger(value: float, limit: float) -> str:

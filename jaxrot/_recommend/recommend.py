@@ -69,35 +69,26 @@ def recommend_step_by_step(
     sample = take_sample(matrices, previous, dtype)
     allowed = tolerance / MARGIN
     measured, excluded = _measure_all(sample, allowed, advance)
+    measured.sort(key=lambda entry: entry.candidate.error)
     meeting = [entry for entry in measured if entry.candidate.error <= allowed]
-    failing = sorted(
-        (entry for entry in measured if entry.candidate.error > allowed), key=lambda entry: entry.candidate.error
-    )
+    failing = measured[len(meeting) :]
     advance("timing")
     timed = candidates.time_candidates(meeting or failing[:1], sample)
     chosen = _cheapest(timed)
-    errors = [entry.candidate for entry in failing if entry.candidate.name != chosen.name]
-    judged = sample.judged
     return Recommendation(
-        name=chosen.name,
-        method=chosen.method,
-        step=chosen.step,
-        iterations=chosen.iterations,
+        **chosen._asdict(),
         apply=candidates.apply_of(chosen, takes_previous=sample.starts is not None),
         meets=bool(meeting),
-        error=chosen.error,
-        time_ns=chosen.time_ns,
-        time_quartiles_ns=chosen.time_quartiles_ns,
         tolerance=tolerance,
         margin=MARGIN,
         dtype=sample.dtype,
-        batch=candidates.batch_size(sample),
-        sample=len(judged.matrices),
+        batch=sample.batch,
+        sample=len(sample.judged.matrices),
         given=sample.given,
         not_finite=sample.not_finite,
         undetermined=candidates.undetermined(sample),
         runners_up=tuple(candidate for candidate in timed if candidate.name != chosen.name),
-        too_inaccurate=tuple(errors),
+        too_inaccurate=tuple(entry.candidate for entry in failing if entry.candidate.name != chosen.name),
         excluded=FrozenMapping(excluded),
     )
 
@@ -114,16 +105,12 @@ def _measure_all(
         measured.append(candidates.measure_method(name, sample))
     for name in STEPS if sample.starts is not None else ():
         if (reason := candidates.start_outside_domain(name, sample)) is not None:
-            excluded[_step_name(name)] = reason
+            # "steps" tells them from methods: `cayley` and `torque` are names of both.
+            excluded[f"{name} steps"] = reason
             continue
         advance(f"measuring {name} steps")
         measured.append(candidates.measure_step(name, sample, allowed))
     return measured, excluded
-
-
-def _step_name(step: str) -> str:
-    # "steps" tells them from methods: `cayley` and `torque` are names of both.
-    return f"{step} steps"
 
 
 def _cheapest(timed: list[Candidate]) -> Candidate:

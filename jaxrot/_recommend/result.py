@@ -66,7 +66,7 @@ class Recommendation(NamedTuple):
     @property
     def statement(self) -> str:
         """The recommendation in a few sentences."""
-        return " ".join([self._verdict(), *self._beside(), *self._left_out()])
+        return " ".join([self._verdict(), *self._details()])
 
     def _verdict(self) -> str:
         finite = self.given - self.not_finite
@@ -88,23 +88,21 @@ class Recommendation(NamedTuple):
         )
         return text + (" That is within the tolerance, but without the margin." if self.error <= self.tolerance else "")
 
-    def _beside(self) -> list[str]:
+    def _details(self) -> list[str]:
         sentences = []
         if faster := [each.name for each in self.runners_up if each.time_ns < self.time_ns]:
             sentences.append(
                 f"{listed(faster)} had a smaller median time, but the difference is within the spread, and"
                 f" {self.name} has the smallest error."
             )
-        for each in self.runners_up:
-            if each.name == DEFAULT_METHOD:
-                sentences.append(f"The default, {each.name}, takes {number(each.time_ns)} ns.")
-        return sentences
-
-    def _left_out(self) -> list[str]:
-        sentences = []
+        default = [each.time_ns for each in self.runners_up if each.name == DEFAULT_METHOD]
+        sentences += [f"The default, {DEFAULT_METHOD}, takes {number(time_ns)} ns." for time_ns in default]
         if self.excluded:
+            shown = list(self.excluded)[:4]
+            if len(self.excluded) > 4:
+                shown.append(f"{len(self.excluded) - 4} more")
             sentences.append(
-                f"Not considered, because their declared domain does not hold these matrices: {_some(self.excluded)}."
+                f"Not considered, because their declared domain does not hold these matrices: {listed(shown)}."
             )
         if self.not_finite:
             sentences.append(
@@ -120,8 +118,3 @@ class Recommendation(NamedTuple):
 
 def _matrices(count: int) -> str:
     return f"{count:,} {'matrix' if count == 1 else 'matrices'}"
-
-
-def _some(names: Mapping[str, str]) -> str:
-    shown = list(names)[:4]
-    return listed([*shown, f"{len(names) - 4} more"] if len(names) > 4 else shown)

@@ -19,29 +19,22 @@ MOST_MATRICES = 10_000
 # The number of extreme matrices of each kind, which a random sample could miss: the largest κ and the smallest s3/s1.
 EXTREMES = 100
 
+# A batch has the size of the sample within these limits. In smaller batches the overhead of a call dominates.
+SMALLEST_BATCH, LARGEST_BATCH = 10_000, 100_000
 # A start with a larger ‖RᵀR − 1‖_F is not a rotation that has drifted, but a mistake of the caller.
 _FARTHEST_FROM_ROTATION = 0.1
 _CHUNK = 100_000
 
 
 class Sample(NamedTuple):
-    """The sample, and a survey of all matrices.
+    """The sample, and a survey of all matrices."""
 
-    Attributes:
-        judged: The sample in the computing dtype, with its reference.
-        starts: The rotations to start from, one a matrix of the sample, or None.
-        given: Number of matrices given.
-        not_finite: Number of matrices left out because they or their starts hold NaN or inf.
-        n_inverted: Number of finite matrices with det A < 0, or 0 up to rounding.
-        largest_condition: Largest κ of the finite matrices; inf if an R* is not unique up to rounding.
-    """
-
-    judged: Judged
-    starts: np.ndarray | None
-    given: int
-    not_finite: int
-    n_inverted: int
-    largest_condition: float
+    judged: Judged  # The sample in the computing dtype, with its reference
+    starts: np.ndarray | None  # The rotations to start from, one a matrix of the sample
+    given: int  # Number of matrices given
+    not_finite: int  # Number of matrices left out because they or their starts hold NaN or inf
+    n_inverted: int  # Number of finite matrices with det A < 0, or 0 up to rounding
+    largest_condition: float  # Largest κ of the finite matrices; inf if an R* is not unique up to rounding
 
     @property
     def dtype(self) -> str:
@@ -52,6 +45,11 @@ class Sample(NamedTuple):
     def finite(self) -> int:
         """The number of matrices that are not left out."""
         return self.given - self.not_finite
+
+    @property
+    def batch(self) -> int:
+        """The number of matrices in a timed call."""
+        return min(max(self.finite, SMALLEST_BATCH), LARGEST_BATCH)
 
 
 def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLike | None) -> Sample:
@@ -133,7 +131,8 @@ def _check_rotations(starts: np.ndarray) -> None:
 def _survey(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns κ and s3/s1 of every matrix, to float64 rounding, which is coarser than that of the reference."""
     parts = [_survey_chunk(matrices[begin : begin + _CHUNK]) for begin in range(0, len(matrices), _CHUNK)]
-    return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+    condition, relative_s3 = map(np.concatenate, zip(*parts, strict=True))
+    return condition, relative_s3
 
 
 def _survey_chunk(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

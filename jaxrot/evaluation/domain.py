@@ -12,15 +12,32 @@ LOST_TRACE_BOUND = 16
 TORQUE_BOUND = 128
 
 
+# The largest κ for an approximation: s2 + s3 ≥ s1. Approximations are for matrices near a rotation, κ = ½. They declare
+# no limit in units of eps, because their error is not rounding.
+APPROXIMATION_LIMIT = 1.0
+
+
+def condition_limit(method: Method, dtype: str) -> float:
+    """The largest κ that a method is for; infinite if it is for matrices with a NaN or without a unique R too."""
+    if not method.exact:
+        return APPROXIMATION_LIMIT
+    declared = method.condition_limit[dtype]
+    return float("inf") if declared >= largest_condition(dtype) else declared
+
+
+def is_within(condition: np.ndarray | float, limit: float, dtype: str) -> np.ndarray:
+    """Whether κ is at most the limit, up to rounding: the κ of a rounded rotation is ½ only to a few eps."""
+    return np.isinf(limit) | (np.asarray(condition) <= limit * (1 + 8 * float(np.finfo(dtype).eps)))
+
+
 def in_domain(method: Method, judged: Judged) -> np.ndarray:
-    """Whether each matrix lies in the domain on which the method declares that it keeps the contract."""
+    """Whether each matrix lies in the domain on which the method declares that it keeps the contract.
+
+    An approximation declares that for no matrix.
+    """
     dtype = judged.matrices.dtype.name
-    limit = method.condition_limit[dtype]
-    # A limit this high includes matrices with a NaN or without a unique R.
-    inside = np.full(len(judged.matrices), limit >= largest_condition(dtype)) | (judged.condition <= limit)
-    if not method.handles_inversion:
-        inside = inside & (~judged.is_inverted)
-    return inside
+    inside = is_within(judged.condition, condition_limit(method, dtype), dtype) & method.exact
+    return inside if method.handles_inversion else inside & ~judged.is_inverted
 
 
 def largest_condition(dtype: str) -> float:

@@ -119,8 +119,7 @@ def _as_call(result: Recommendation) -> str:
 
 def _measured_table(result: Recommendation) -> Table:
     verdict = "recommended" if result.meets else "nearest"
-    chosen = Candidate(*(getattr(result, field) for field in Candidate._fields))
-    lines = [(chosen, verdict)]
+    lines = [(Candidate(*(getattr(result, field) for field in Candidate._fields)), verdict)]
     lines += [(candidate, "meets it") for candidate in result.runners_up]
     lines += [(candidate, "too inaccurate") for candidate in result.too_inaccurate]
     rows = [[candidate.name, number(candidate.error), _time(candidate), word] for candidate, word in lines]
