@@ -1,16 +1,11 @@
 """The fast optimal attitude matrix (FOAM): the largest root of a quartic, then a polynomial in A."""
 
-import jax
 import jax.numpy as jnp
-from jax import lax
 
 from jaxrot._algebra import mat3
 from jaxrot._algebra.mat3 import Mat3
-from jaxrot._algebra.scaling import safe_divide, unit_scaled
-
-# Newton's method descends from the upper bound. At the double root, s2+s3 → 0, each step only halves the distance, and
-# rounding stops it after these counts.
-_NEWTON_STEPS = {"float32": 14, "float64": 28}
+from jaxrot._algebra.scaling import unit_scaled
+from jaxrot.steps.quest import largest_root
 
 
 def solve(a: Mat3) -> Mat3:
@@ -31,20 +26,8 @@ def solve(a: Mat3) -> Mat3:
     cofactor = mat3.cofactor(a)
     square = mat3.squared_norm(a)
     determinant = mat3.dot(a[0], cofactor[0])
-    f = largest_root(cofactor, square, determinant)
+    f = largest_root(cofactor, square, determinant, jnp.sqrt(3 * square))
     gram = mat3.transpose_multiply(a, a)
     numerator = mat3.add(mat3.scale(a, f * f + square), mat3.scale(mat3.multiply(a, gram), -2.0))
     numerator = mat3.add(numerator, mat3.scale(cofactor, 2 * f))
     return mat3.scale(numerator, 1 / (f * (f * f - square) - 2 * determinant))
-
-
-def largest_root(cofactor: Mat3, square: jax.Array, determinant: jax.Array) -> jax.Array:
-    """The sum s1+s2+s3 by Newton's method from the upper bound √(3I), from which it descends monotonically."""
-    constant = 4 * mat3.squared_norm(cofactor)
-
-    def newton(_, f: jax.Array) -> jax.Array:
-        excess = f * f - square
-        value = excess * excess - 8 * determinant * f - constant
-        return f - safe_divide(value, 4 * (f * excess - 2 * determinant))
-
-    return lax.fori_loop(0, _NEWTON_STEPS[square.dtype.name], newton, jnp.sqrt(3 * square))

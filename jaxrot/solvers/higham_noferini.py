@@ -8,7 +8,7 @@ from jaxrot._algebra.mat3 import Mat3
 from jaxrot._algebra.quaternion import Columns, Quaternion
 from jaxrot._algebra.scaling import safe_divide, unit_scaled
 from jaxrot._algebra.select import constant_like
-from jaxrot.solvers.foam import largest_root
+from jaxrot.steps.quest import largest_root
 
 # Each iteration multiplies the error of the eigenvector by the error of the eigenvalue over its gap.
 _INVERSE_ITERATIONS = 2
@@ -34,7 +34,8 @@ def solve(a: Mat3) -> Mat3:
     """
     a = unit_scaled(a)
     cofactor = mat3.cofactor(a)
-    f = largest_root(cofactor, mat3.squared_norm(a), mat3.dot(a[0], cofactor[0]))
+    square = mat3.squared_norm(a)
+    f = largest_root(cofactor, square, mat3.dot(a[0], cofactor[0]), jnp.sqrt(3 * square))
     q = null_vector(quaternion.davenport_columns(mat3.scale(a, -1.0), f))
     return quaternion.to_orthonormal(q)
 

@@ -11,7 +11,8 @@ from jaxrot._algebra.quaternion import Quaternion
 from jaxrot._algebra.scaling import safe_divide, safe_sqrt
 from jaxrot.steps.cayley import cayley_map
 
-# Near its double root Newton's method only halves the distance; see `solvers.foam`.
+# Newton's method descends from the upper bound. At the double root, s2+s3 → 0, each step only halves the distance, and
+# rounding stops it after these counts.
 _NEWTON_STEPS = {"float32": 14, "float64": 28}
 
 
@@ -43,20 +44,23 @@ def correction(b: Mat3) -> Quaternion:
 
 
 def sum_of_singular_values(a: Mat3) -> jax.Array:
-    """The sum f = s1+s2+s3, signed, by Newton's method from the upper bound √(3I).
+    """The sum s1+s2+s3, signed."""
+    cofactor, square = mat3.cofactor(a), mat3.squared_norm(a)
+    return largest_root(cofactor, square, mat3.dot(a[0], cofactor[0]), safe_sqrt(3 * square))
+
+
+def largest_root(cofactor: Mat3, square: jax.Array, determinant: jax.Array, start: jax.Array) -> jax.Array:
+    """The sum f = s1+s2+s3, signed, by Newton's method, which descends from the upper bound √(3I), the start.
 
     It is the largest root of ((f² − I)/2)² = K + 2Jf with I = ‖A‖², K = ‖cof A‖² and J = det A. A form without
     cancellation in f, f = √(I + 2√(K + 2Jf)) for J ≥ 0, is no better: near rank 1 both are off by 25 eps s1 at
     s2 = 1e-3, because J is rounded.
     """
-    cofactor = mat3.cofactor(a)
-    square = mat3.squared_norm(a)
     squared_cofactor = mat3.squared_norm(cofactor)
-    determinant = mat3.dot(a[0], cofactor[0])
 
     def newton(_, f: jax.Array) -> jax.Array:
         excess = (f * f - square) * 0.5
         value = excess * excess - squared_cofactor - 2 * determinant * f
         return f - safe_divide(value, 2 * (f * excess - determinant))
 
-    return lax.fori_loop(0, _NEWTON_STEPS[square.dtype.name], newton, safe_sqrt(3 * square))
+    return lax.fori_loop(0, _NEWTON_STEPS[square.dtype.name], newton, start)
