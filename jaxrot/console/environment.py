@@ -1,9 +1,12 @@
-"""The header of a report: the machine, the versions and the settings behind its numbers."""
+"""The machine, the versions and the settings behind measured numbers."""
 
+import contextlib
 import datetime
 import os
 import platform
+import re
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
@@ -13,9 +16,25 @@ import numpy as np
 import jaxrot
 
 
+@contextlib.contextmanager
+def measuring_configuration() -> Iterator[None]:
+    """Allows float64, and disables the compilation cache, which would shorten the measured compile times."""
+    wanted = {"jax_enable_x64": True, "jax_enable_compilation_cache": False}
+    before = {name: getattr(jax.config, name) for name in wanted}
+    try:
+        for name, value in wanted.items():
+            jax.config.update(name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            jax.config.update(name, value)
+
+
 def describe_environment(dtypes: tuple[str, ...]) -> dict[str, str]:
-    """The lines of the header, values by name, in order."""
+    """The lines of a report's header, values by name."""
     device = jax.devices()[0]
+    # If it is well above 0, other processes disturbed the timings.
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     return {
         "jaxrot": f"{jaxrot.__version__}, commit {commit()}",
         "date": datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds"),
@@ -23,7 +42,7 @@ def describe_environment(dtypes: tuple[str, ...]) -> dict[str, str]:
         "jax, jaxlib, numpy": f"{jax.__version__}, {jaxlib.version.__version__}, {np.__version__}",
         "device": f"{device.platform}: {processor() if device.platform == 'cpu' else device.device_kind}",
         "threads": f"{usable_cores()} cores usable",
-        "load average": f"{load_average()} before the start",
+        "load average": f"{load} before the start",
         "XLA_FLAGS": os.environ.get("XLA_FLAGS", "") or "none",
         "dtype": ", ".join(dtypes),
     }
@@ -34,40 +53,29 @@ def commit() -> str:
 
     git must track this file, because an installed copy may lie inside a checkout of another project.
     """
-    here = Path(__file__)
-    if _git("ls-files", "--error-unmatch", here.name, folder=here.parent) is None:
-        return "unknown (not a checkout)"
-    name = _git("rev-parse", "--short=12", "HEAD", folder=here.parent)
-    changed = _git("status", "--porcelain", "--untracked-files=no", folder=here.parent)
-    return "unknown" if name is None else name + ("+" if changed else "")
+    folder, name = os.path.split(__file__)
 
+    def git(*arguments: str) -> str:
+        command = ["git", *arguments]
+        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=10, check=True, encoding="utf-8")
+        return done.stdout.strip()
 
-def _git(*arguments: str, folder: Path) -> str | None:
     try:
-        done = subprocess.run(
-            ["git", *arguments], cwd=folder, capture_output=True, text=True, timeout=10, check=True, encoding="utf-8"
-        )
+        git("ls-files", "--error-unmatch", name)
+        return git("describe", "--always", "--exclude=*", "--abbrev=12", "--dirty=+")
     except (OSError, subprocess.SubprocessError):
-        return None
-    return done.stdout.strip()
+        return "unknown (not a checkout)"
 
 
 def processor() -> str:
     """The processor's name, if the operating system tells it."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
+    with contextlib.suppress(OSError):
+        content = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        if found := re.search(r"^model name\s*:\s*(.+)$", content, re.MULTILINE):
+            return found[1].strip()
     return platform.processor() or platform.machine() or "unknown processor"
 
 
 def usable_cores() -> int:
     """The cores that this process may use: fewer than the machine has under `taskset` or in a container."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def load_average() -> str:
-    """The one-minute load average. If it is well above 0, other processes disturbed the timings."""
-    return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"

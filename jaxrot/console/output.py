@@ -8,21 +8,19 @@ from pathlib import Path
 
 from jaxrot.console.errors import UserError, shown
 
+_EXPECTED = "expected a folder, or a name for a new one"
+
 
 def check_writable(folder: Path) -> None:
-    """Checks that the folder can be written to, by trying: permission bits say nothing about a read-only file system.
+    """Raises a UserError if the path is a file, leads through one, or cannot be written to.
 
-    Raises:
-        UserError: The path is a file, leads through one, or cannot be written to.
+    It tries to write, because permission bits say nothing about a read-only file system.
     """
     try:
-        if folder.exists() and not folder.is_dir():
-            raise UserError(f"--out {shown(folder)}: this is a file; expected a folder, or a name for a new one")
         nearest = next(place for place in [folder, *folder.absolute().parents] if place.exists())
         if not nearest.is_dir():
-            raise UserError(
-                f"--out {shown(folder)}: {shown(nearest)} is a file; expected a folder, or a name for a new one"
-            )
+            name = "this" if nearest == folder else shown(nearest)
+            raise UserError(f"--out {shown(folder)}: {name} is a file; {_EXPECTED}")
         # Most systems give this file no name, so that nothing is left behind after a Ctrl-C.
         tempfile.TemporaryFile(prefix=".jaxrot-", dir=nearest).close()
     except OSError as error:
@@ -30,12 +28,9 @@ def check_writable(folder: Path) -> None:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Writes all files or none. Other files in an existing folder stay.
+    """Writes all files, or none and raises a UserError. Other files in an existing folder stay.
 
     The files go to a temporary folder on the same file system first, so that only renames can fail after that.
-
-    Raises:
-        UserError: Something cannot be written.
     """
     temporary = None
     try:
@@ -60,6 +55,4 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def _cannot_write(folder: Path, error: OSError) -> UserError:
     reason = (error.strerror or str(error)).lower()
-    return UserError(
-        f"--out {shown(folder)}: cannot be written to ({reason}); expected a folder, or a name for a new one"
-    )
+    return UserError(f"--out {shown(folder)}: cannot be written to ({reason}); {_EXPECTED}")

@@ -21,17 +21,12 @@ def tabulate(title: str, items: Iterable[Item], columns: Mapping[str, Callable[[
 
 def as_text(table: Table) -> str:
     """The table for a terminal, columns of numbers aligned to the right."""
-    lines = [table.header, *table.rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(table.header))]
-    set_lines = [
-        "  ".join(
-            word.rjust(width) if is_number else word.ljust(width)
-            for word, width, is_number in zip(line, widths, _are_numbers(table), strict=True)
-        ).rstrip()
-        for line in lines
-    ]
-    rule = "  ".join("-" * width for width in widths)
-    return "\n".join([table.title, "", set_lines[0], rule, *set_lines[1:]])
+    columns = []
+    for words, is_number in zip(zip(table.header, *table.rows, strict=True), _are_numbers(table), strict=True):
+        width = max(map(len, words))
+        head, *entries = (word.rjust(width) if is_number else word.ljust(width) for word in words)
+        columns.append([head, "-" * width, *entries])
+    return "\n".join([table.title, "", *("  ".join(line).rstrip() for line in zip(*columns, strict=True))])
 
 
 def as_markdown(table: Table) -> str:

@@ -11,13 +11,11 @@ from jaxrot import Recommendation
 from jaxrot._recommend.candidates import Candidate
 from jaxrot._recommend.recommend import recommend_step_by_step
 from jaxrot.console.arguments import path
-from jaxrot.console.configuration import measuring_configuration
-from jaxrot.console.environment import describe_environment
+from jaxrot.console.environment import describe_environment, measuring_configuration
 from jaxrot.console.errors import UserError, shown
-from jaxrot.console.extras import check_installed
 from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.printing import show
-from jaxrot.console.progress import progress
+from jaxrot.console.progress import check_installed, progress
 from jaxrot.console.tables import Table, as_text
 from jaxrot.evaluation.formatting import number
 from jaxrot.report.inputs import Input, read_input
@@ -45,11 +43,6 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
 
     Returns:
         The exit status: 0, even if no method meets the tolerance. The text says so.
-
-    Raises:
-        UserError: Something the user can fix.
-        UnreadError: The reader closed standard output.
-        KeyboardInterrupt: The command was interrupted before there was a result.
     """
     tolerance = _parse_tolerance(options.tolerance)
     if options.dtype not in (None, *_DTYPES):

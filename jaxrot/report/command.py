@@ -7,14 +7,12 @@ from pathlib import Path
 import jaxrot
 from jaxrot._startup import INTERRUPTED
 from jaxrot.console.arguments import path
-from jaxrot.console.configuration import measuring_configuration
-from jaxrot.console.environment import describe_environment
+from jaxrot.console.environment import describe_environment, measuring_configuration
 from jaxrot.console.errors import UserError, shown
-from jaxrot.console.extras import check_installed
 from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.printing import show
-from jaxrot.console.progress import progress
+from jaxrot.console.progress import check_installed, progress
 from jaxrot.report.comparison import compare, read_report
 from jaxrot.report.data import ReportData
 from jaxrot.report.inputs import dragon_input, read_input, thinned

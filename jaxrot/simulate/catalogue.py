@@ -15,17 +15,11 @@ from jaxrot.scenes.tetrahedron import tetrahedron
 
 
 class Entry(NamedTuple):
-    """A scene that can be run by name.
+    """A scene that can be run by name."""
 
-    Attributes:
-        build: The scene, of the mesh if there is one.
-        read_mesh: What it takes of a mesh file of the user's; None: it takes none.
-        summary: One line.
-    """
-
-    build: Callable[..., Scene]
-    read_mesh: Callable[[Path], Any] | None
-    summary: str
+    build: Callable[..., Scene]  # Returns the scene, of the mesh if there is one
+    read_mesh: Callable[[Path], Any] | None  # Returns what it takes of a user's mesh file; None if it takes none
+    summary: str  # One line
 
 
 SCENES: Mapping[str, Entry] = MappingProxyType(

@@ -10,11 +10,10 @@ from jaxrot._startup import INTERRUPTED
 from jaxrot.console.arguments import path
 from jaxrot.console.environment import describe_environment
 from jaxrot.console.errors import UserError, shown
-from jaxrot.console.extras import check_installed
 from jaxrot.console.interrupts import Interrupts
 from jaxrot.console.output import check_writable, write_files
 from jaxrot.console.printing import show
-from jaxrot.console.progress import progress
+from jaxrot.console.progress import check_installed, progress
 from jaxrot.scenes.scene import Scene
 from jaxrot.simulate.animation import draw_animation
 from jaxrot.simulate.catalogue import SCENES
@@ -42,16 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
-    """Runs the scene, draws it, writes and prints; the user's mistakes are found before anything is computed.
+    """Runs the scene, draws it, writes and prints. Mistakes of the user are found before anything is computed.
 
     A Ctrl-C ends the steps, or the drawing. What is finished by then is written.
 
     Returns:
-        The exit status: 0; 130 where the steps or the drawing was interrupted.
+        The exit status: 0; 130 if the steps or the drawing was interrupted.
 
     Raises:
-        UserError: Something the user can fix.
-        UnreadError: The reader closed standard output; the files are written.
         KeyboardInterrupt: The command was interrupted before the first step.
     """
     if options.scene not in SCENES:
@@ -66,10 +63,12 @@ def run(options: argparse.Namespace, interrupts: Interrupts) -> int:
     with progress(interrupts) as advance:
         recording = record(scene, steps, _FRAMES, advance, interrupts)
         pictures = _draw(scene, recording, advance, interrupts)
+    summary = {name: getattr(recording, name) for name in ("steps", "seconds", "compile_seconds")}
+    summary = {"scene": options.scene, **summary, "complaints": complaints(recording), "environment": environment}
     files = {
         **pictures,
         "health.csv": as_csv(recording).encode(),
-        "run.json": json.dumps(_summary(options.scene, recording, environment), indent=2).encode(),
+        "run.json": json.dumps(summary, indent=2).encode(),
     }
     write_files(folder, files)
     parts = [_text(scene, recording)]
@@ -117,17 +116,6 @@ def _parse_steps(word: str) -> int:
     if not 1 <= steps <= _MOST_STEPS:
         raise UserError(f"--steps {shown(word)}: expected a whole number from 1 to {_MOST_STEPS:,}")
     return steps
-
-
-def _summary(name: str, recording: Recording, environment: dict[str, str]) -> dict[str, object]:
-    return {
-        "scene": name,
-        "steps": recording.steps,
-        "seconds": recording.seconds,
-        "compile_seconds": recording.compile_seconds,
-        "complaints": complaints(recording),
-        "environment": environment,
-    }
 
 
 def _text(scene: Scene, recording: Recording) -> str:

@@ -14,7 +14,7 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#000000")
 
 
 def draw_health(recording: Recording, title: str) -> bytes:
-    """A panel for each unit, what is never negative and spans decades on a logarithmic axis."""
+    """A panel for each unit. Values that are never negative and span decades get a logarithmic axis."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -44,9 +44,7 @@ def as_csv(recording: Recording) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(["time (s)", *recording.health])
-    writer.writerows(
-        zip(recording.times.tolist(), *(values.tolist() for values in recording.health.values()), strict=True)
-    )
+    writer.writerows(np.stack([recording.times, *recording.health.values()], axis=1).tolist())
     return buffer.getvalue()
 
 

@@ -1,4 +1,4 @@
-"""Running a scene: frames and health at equal distances in time, and how long the steps alone took."""
+"""Runs a scene: frames and health at equal distances in time, and the time of the steps alone."""
 
 import contextlib
 import time
@@ -17,48 +17,30 @@ _MOST_STEPS_A_CALL = 10**6
 
 
 class _Frame(NamedTuple):
-    """What was seen after `made` steps, which took so many seconds."""
-
-    made: int
-    seconds: float
+    made: int  # Steps so far
+    seconds: float  # Their time
     points: np.ndarray
     health: list[np.ndarray]
 
 
 class Recording(NamedTuple):
-    """What was seen of a run, from its first state on.
+    """The frames of a run, from its first state on."""
 
-    Attributes:
-        times: Simulated seconds of each frame, shape (frames,).
-        points: What to draw, shape (frames, n, 3).
-        health: The watched scalars, each of shape (frames,).
-        steps: How many steps were made.
-        seconds: How long they took, without the compilation.
-        compile_seconds: How long the compilation took.
-    """
-
-    times: np.ndarray
-    points: np.ndarray
-    health: dict[str, np.ndarray]
-    steps: int
-    seconds: float
+    times: np.ndarray  # Simulated seconds, shape (frames,)
+    points: np.ndarray  # The points to draw, shape (frames, n, 3)
+    health: dict[str, np.ndarray]  # The monitored scalars, each of shape (frames,)
+    steps: int  # The number of steps made
+    seconds: float  # Their time, without the compilation
     compile_seconds: float
 
 
 def record(
     scene: Scene, steps: int, frames: int, advance: Callable[[str], None], interrupts: Interrupts | None = None
 ) -> Recording:
-    """Makes the steps, or as many as there are until the user interrupts.
+    """Makes the steps, or fewer if the user interrupts, and records about so many frames of them.
 
-    Args:
-        scene: What to run.
-        steps: How many steps, at least 1.
-        frames: About how many pictures of them, at least 1.
-        advance: Called before each stretch between two frames, with what is done.
-        interrupts: Ctrl-C; held from the first step on.
-
-    Returns:
-        The recording; `steps` is smaller than asked where it was interrupted.
+    `advance` is called before each stretch between two frames, with what is done. `interrupts` is held from the first
+    step on.
 
     Raises:
         KeyboardInterrupt: No step was made before the interruption.
@@ -105,14 +87,14 @@ def record(
 
 
 class _Calls:
-    """Calls of the compiled steps, none so long that a Ctrl-C has to wait for its end."""
+    """Calls of the compiled steps, so short that a Ctrl-C need not wait for the end of one."""
 
     def __init__(self, run: Callable[[State, int], State], interrupts: Interrupts) -> None:
         self._run, self._interrupts = run, interrupts
         self._count = 1
 
     def make(self, state: State, count: int) -> tuple[State, int, float]:
-        """The state after these steps or, after a Ctrl-C, after some of them; their number, and the seconds."""
+        """Returns the state after these steps, or after some of them if Ctrl-C was pressed, their number, and time."""
         made, seconds = 0, 0.0
         while True:
             some = min(self._count, count - made)

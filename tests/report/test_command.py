@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 import jaxrot
 from jaxrot.__main__ import main
-from jaxrot.console.configuration import measuring_configuration
+from jaxrot.console.environment import measuring_configuration
 from jaxrot.report import command
 from jaxrot.report.inputs import WHOLE, Input, read_input, thinned
 

@@ -164,7 +164,7 @@ def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.parametrize("is_terminal", [False, True])
 def test_a_missing_extra_is_named_with_what_brings_it(is_terminal, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("jaxrot.console.extras.importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("jaxrot.console.progress.importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
     text = _refused(["report", "--out", tmp_path / "out"], capsys)
     assert "pip install 'jaxrot[report]'" in text
