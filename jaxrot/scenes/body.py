@@ -46,7 +46,7 @@ def build_body(
     Args:
         rest_vertices: Shape (n, 3), m.
         clusters: Vertex indices of every cluster. Lengths may differ; every vertex must be in a cluster.
-        masses: Of the vertices, kg, shape (n,); 1/n each if not given.
+        masses: Of the vertices, shape (n,), kg; 1/n each if not given.
         dtype: Of the floating-point arrays.
 
     Raises:
@@ -76,19 +76,9 @@ def build_two_scale_body(
 ) -> Body:
     """Returns a body with clusters of neighbours, two for every vertex on average, and clusters across the whole body.
 
-    Args:
-        rest_vertices: As for `build_body`.
-        masses: As for `build_body`.
-        cluster_size: Vertices in a cluster.
-        dtype: As for `build_body`.
-
-    Raises:
-        ValueError: As `build_body`; a size that is not positive.
-
-    Cost:
-        Building takes time in proportion to n², a second for 23,000 vertices. A step takes time in proportion to n.
+    Each cluster has `cluster_size` vertices. The other arguments are those of `build_body`. Building takes time in
+    proportion to n², a second for 23,000 vertices. A step takes time in proportion to n.
     """
-    if cluster_size < 1:
-        raise ValueError(f"cluster_size must be positive; got {cluster_size}")
+    check("finite and > 0", cluster_size=cluster_size)
     vertices = checked_vertices(rest_vertices)
     return build_body(vertices, two_scale_clusters(vertices, cluster_size), masses, dtype=dtype)

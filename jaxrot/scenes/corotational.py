@@ -5,12 +5,12 @@ Each step minimises (1 + α h)/(2 h²) ‖u‖²_M − uᵀM(v/h + g) + E(x + u)
 Sources: Müller and Gross 2004; Chao et al. 2010; Gast et al. 2015 (the step as a minimum).
 """
 
+import functools
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.typing import ArrayLike
 
 from jaxrot import METHODS, STEPS
 from jaxrot._compiled import exportable
@@ -77,12 +77,8 @@ def build(
     held = np.zeros(len(mesh.vertices), dtype=bool) if fixed is None else np.asarray(fixed)
     if held.shape != (len(mesh.vertices),) or held.dtype != np.bool_:
         raise ValueError(f"fixed must be bool of shape ({len(mesh.vertices)},); got {held.dtype} of {held.shape}")
-
     count = len(mesh.tetrahedra)
-
-    def array(values: ArrayLike) -> jax.Array:
-        return jnp.asarray(values, dtype)
-
+    array = functools.partial(jnp.asarray, dtype=dtype)
     shear_modulus, lame_first = elasticity.lame_parameters(np.broadcast_to(young, (count,)), poisson)
     elements = Elements(
         corners=jnp.asarray(mesh.tetrahedra),

@@ -13,11 +13,7 @@ from jaxrot.scenes.shape_matching import build_parameters, build_state, step
 
 
 def rest_vertices(*, fine: bool = False) -> np.ndarray:
-    """The vertices at rest, centred and one unit high, the second axis up: float64 of shape (n, 3).
-
-    Args:
-        fine: 22,998 vertices instead of 5,205.
-    """
+    """The 5,205 or, if fine, 22,998 vertices at rest, centred and one unit high, the second axis up: shape (n, 3)."""
     file_name = "dragon_fine.npz" if fine else "dragon.npz"
     with resources.files("jaxrot.scenes").joinpath(file_name).open("rb") as file, np.load(file) as archive:
         vertices = archive["vertices"].astype(np.float64)
@@ -32,14 +28,7 @@ def standing_vertices(*, fine: bool = False) -> np.ndarray:
 
 
 def dragon(mesh_vertices: ArrayLike | None = None) -> Scene:
-    """Returns the scene of the dragon, or another body, that recovers its shape from random vertices.
-
-    Args:
-        mesh_vertices: The other body at rest, shape (n, 3), any unit, the third axis up.
-
-    Raises:
-        ValueError: Vertices of another shape, or not finite.
-    """
+    """Returns the scene of the dragon, or a body of these vertices, that recovers its shape from random vertices."""
     if mesh_vertices is not None:
         return _recovery("Body", checked_vertices(mesh_vertices), seed=0)
     # Scrambled vertices leave the final orientation to chance. With this seed the dragon ends on its feet, 20° off.

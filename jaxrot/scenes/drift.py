@@ -57,12 +57,8 @@ def build(rates: ArrayLike, time_step: ArrayLike, *, dtype: type = np.float32) -
 
     Args:
         rates: Body rates ω of every step of a cycle, shape (period, ..., 3), rad/s; a constant rate has the period 1.
-        time_step: Δt, shape () or (...), s.
+        time_step: Δt, shape () or (...), s. A step must turn by less than a quarter turn.
         dtype: Of the rotations, float32 or float64.
-
-    Raises:
-        ValueError: Wrong shape; a rate that is not finite; a time step that is not finite and positive; a step of a
-            quarter turn or more.
     """
     w, h = np.asarray(rates, dtype=np.float64), np.asarray(time_step, dtype=np.float64)
     if w.ndim < 2 or w.shape[-1] != 3 or w.size == 0:

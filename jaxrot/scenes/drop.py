@@ -20,19 +20,14 @@ BLOCK = ((-0.8, -0.4, -0.1), (-0.1, 0.4, 0.25))
 
 
 def drop(mesh_vertices: ArrayLike | None = None) -> Scene:
-    """Returns the scene of the dragon, or another body, dropped onto a block on the ground in a room.
+    """Returns the scene of the dragon, or a body of these vertices, dropped onto a block on the ground in a room.
 
-    Args:
-        mesh_vertices: The other body at rest, shape (n, 3), the third axis up; scaled to a diagonal of 1 m.
-
-    Raises:
-        ValueError: Vertices of another shape, not finite, or all in one place.
+    The body is scaled to a diagonal of 1 m. The third axis of its vertices is up.
     """
     body = build_two_scale_body(_one_metre(standing_vertices() if mesh_vertices is None else mesh_vertices))
     contact = build_contact(ground_height=0.0, box=ROOM, obstacle=BLOCK, restitution=0.1, friction=0.4)
-    parameters = build_parameters(
-        body, time_step=1 / 120, stiffness=0.3, damping=0.05, gravity=(0.0, 0.0, -9.81), contact=contact
-    )
+    choices = {"time_step": 1 / 120, "stiffness": 0.3, "damping": 0.05, "gravity": (0.0, 0.0, -9.81)}
+    parameters = build_parameters(body, contact=contact, **choices)
     lowest = float(jnp.min(body.rest_positions[:, 2]))
     start = body.rest_positions + jnp.asarray([0.0, 0.0, 0.75 - lowest], body.rest_positions.dtype)[None]
     title = f"A soft {'dragon' if mesh_vertices is None else 'body'} dropped onto a block"

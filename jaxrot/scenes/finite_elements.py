@@ -42,12 +42,8 @@ def health(state: State, parameters: Parameters, *, is_clamped: bool = False) ->
 def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
     """Returns the scene of a beam that is clamped at its lower end along the first axis, and bends by its own weight.
 
-    Args:
-        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), of another body. Its stiffness is such that a
-            beam of these lengths sags by about its length. The time step fits its size.
-
-    Raises:
-        ValueError: An unusable mesh.
+    `mesh` is another body in metres. Its stiffness is such that a beam of these lengths sags by about its length. The
+    time step fits its size.
     """
     body = tetrahedra.box((20, 3, 3), (2.0, 0.3, 0.3)) if mesh is None else tetrahedra.checked(*mesh)
     lower, size = body.vertices.min(axis=0), np.ptp(body.vertices, axis=0)
@@ -72,11 +68,7 @@ def cantilever(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
 def recovery(mesh: tuple[np.ndarray, np.ndarray] | None = None) -> Scene:
     """Returns the scene of a free block that recovers its shape from random vertices, half of the elements inverted.
 
-    Args:
-        mesh: Vertices, shape (n, 3), m, and tetrahedra, shape (k, 4), instead of a cube of 1 m.
-
-    Raises:
-        ValueError: An unusable mesh.
+    `mesh` is another body in metres, instead of a cube of 1 m.
     """
     body = tetrahedra.box((6, 6, 6), (1.0, 1.0, 1.0)) if mesh is None else tetrahedra.checked(*mesh)
     lower, size = body.vertices.min(axis=0), np.ptp(body.vertices, axis=0)

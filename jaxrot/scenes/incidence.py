@@ -15,15 +15,11 @@ def incidence(
 
     Args:
         members: Vertex indices, shape (c, s).
-        vertex_count: The number n of vertices.
+        vertex_count: The number n of vertices. Each must be in a group.
         filled: Which places of `members` count, shape (c, s); all of them by default.
 
     Returns:
-        Places as indices into the c·s of `members`, shape (n, k), filled up with c·s; and how many each vertex has,
-        shape (n,).
-
-    Raises:
-        ValueError: A vertex is in no group.
+        Places as indices into the c·s of `members`, shape (n, k), filled up with c·s; and their number, shape (n,).
     """
     occupied = np.arange(members.size) if filled is None else np.flatnonzero(filled.ravel())
     vertex = members.ravel()[occupied]

@@ -68,12 +68,7 @@ def build_parameters(
 
 
 def build_state(body: Body, positions: ArrayLike | None = None, velocities: ArrayLike | None = None) -> State:
-    """Returns the first state, with identity rotations.
-
-    Args:
-        body: The body.
-        positions: m, shape (n, 3); those at rest if not given.
-        velocities: m/s, shape (n, 3); 0 if not given.
+    """Returns the first state, with identity rotations; at rest if positions and velocities are not given.
 
     Raises:
         ValueError: Wrong shape, or not finite.

@@ -1,12 +1,13 @@
-"""Meshes of tetrahedra: boxes, files of the user, validation, and quantities for finite elements."""
+"""Meshes of tetrahedra: boxes, files in any format that meshio reads, validation, quantities for finite elements."""
 
+import contextlib
+import io
 import itertools
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxrot.scenes import mesh_file
 from jaxrot.scenes.checks import checked_vertices
 
 _CORNERS = 4
@@ -37,12 +38,8 @@ def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """Returns the tetrahedra in a mesh file. Vertices of no tetrahedron are left out.
-
-    Raises:
-        ValueError: It cannot be read, or the mesh is unusable.
-    """
-    content = mesh_file.read(path)
+    """Returns the tetrahedra in a mesh file, or raises a ValueError. Vertices of no tetrahedron are left out."""
+    content = _read(path)
     # Take the first four: quadratic tetrahedra list their corners first.
     cells = [block.data[:, :_CORNERS] for block in content.cells if block.type in ("tetra", "tetra10")]
     if not cells:
@@ -52,13 +49,30 @@ def read(path: Path) -> Mesh:
     return checked(np.asarray(content.points)[used], indices.reshape(-1, _CORNERS))
 
 
-def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
-    """Validates a mesh, and orients every tetrahedron so that its volume is positive.
+def read_vertices(path: Path) -> np.ndarray:
+    """Returns the vertices in a file of a mesh of any kind, or raises a ValueError."""
+    return checked_vertices(_read(path).points)
 
-    Raises:
-        ValueError: No tetrahedra, wrong shapes, an index out of range, a vertex that is not finite, too far away or in
-            no tetrahedron, a flat tetrahedron.
-    """
+
+def _read(path: Path) -> Any:
+    """Returns the `meshio.Mesh` in the file. It raises a ValueError without meshio, or if the file cannot be read."""
+    try:
+        import meshio
+    except ImportError:
+        raise ValueError("meshio is not installed; expected: pip install 'jaxrot[scenes]'") from None
+    # meshio prints its errors and ends the process: capture both.
+    messages = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(messages), contextlib.redirect_stderr(messages):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        known = isinstance(error, meshio.ReadError | OSError) and str(error)
+        reason = " ".join(str(error).split()).removesuffix(".") if known else "not a mesh file"
+        raise ValueError(f"the mesh cannot be read ({reason})") from None
+
+
+def checked(vertices: np.ndarray, tetrahedra: np.ndarray) -> Mesh:
+    """Returns the mesh with every tetrahedron oriented so that its volume is positive, or raises a ValueError."""
     tetrahedra = np.asarray(tetrahedra)
     if tetrahedra.size == 0:
         raise ValueError("the mesh has no tetrahedra")

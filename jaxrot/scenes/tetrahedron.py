@@ -71,14 +71,11 @@ def build(
     """Returns the first state, with the identity, and the parameters of a tetrahedron and the path of its tip.
 
     Args:
-        rest: Vertices at rest, the tip last, m, shape (4, 3).
-        tip_path: The tip in every frame, m, shape (frames, 3).
+        rest: Vertices at rest, the tip last, shape (4, 3), m.
+        tip_path: The tip in every frame, shape (frames, 3), m.
         matrix: The matrix whose rotation is extracted: "deformation_gradient", or "shape_matching", Σ x x̄ᵀ over the
             four vertices relative to their mean.
         dtype: Of all arrays, float32 or float64.
-
-    Raises:
-        ValueError: Wrong shape; a vertex or a place that is not finite; a flat tetrahedron; an unknown matrix.
     """
     if np.shape(rest) != (4, 3):
         raise ValueError(f"rest must have shape (4, 3), a vertex a row; got {np.shape(rest)}")

@@ -5,7 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from jaxrot.scenes import mesh_file, tetrahedra
+from jaxrot.scenes import tetrahedra
 from jaxrot.scenes.dragon import dragon, dragon_fine
 from jaxrot.scenes.drift import drift
 from jaxrot.scenes.drop import drop
@@ -24,9 +24,9 @@ class Entry(NamedTuple):
 
 SCENES: Mapping[str, Entry] = MappingProxyType(
     {
-        "dragon": Entry(dragon, mesh_file.vertices, "clustered shape matching: scrambled vertices find their shape"),
+        "dragon": Entry(dragon, tetrahedra.read_vertices, "clustered shape matching: random vertices find their shape"),
         "dragon_fine": Entry(dragon_fine, None, "the same with 22,998 vertices"),
-        "drop": Entry(drop, mesh_file.vertices, "clustered shape matching: a soft body falls onto a block"),
+        "drop": Entry(drop, tetrahedra.read_vertices, "clustered shape matching: a soft body falls onto a block"),
         "cantilever": Entry(cantilever, tetrahedra.read, "co-rotational finite elements: a beam under its weight"),
         "recovery": Entry(recovery, tetrahedra.read, "co-rotational finite elements: an exploded block recovers"),
         "drift": Entry(drift, None, "a million products of rotations, repaired and not"),
