@@ -62,17 +62,13 @@ class Errors(NamedTuple):
 
 
 def run_in_chunks(call: Callable[..., np.ndarray], matrices: np.ndarray, chunk: int, *starts: np.ndarray) -> np.ndarray:
-    """Applies a function compiled for `chunk` matrices to any number of matrices, and to starts if it takes them.
-
-    The last chunk is filled up with its first matrix.
-    """
+    """Applies a function compiled for `chunk` matrices to any number of matrices, and to starts if it takes them."""
     results = []
     for begin in range(0, len(matrices), chunk):
-        parts = [array[begin : begin + chunk] for array in (matrices, *starts)]
-        missing = chunk - len(parts[0])
-        filled = [np.concatenate([part, np.broadcast_to(part[:1], (missing, 3, 3))]) for part in parts]
-        results.append(np.asarray(call(*filled))[: len(parts[0])])
-    return np.concatenate(results)
+        # The last matrix fills up the last chunk.
+        indices = np.minimum(np.arange(begin, begin + chunk), len(matrices) - 1)
+        results.append(np.asarray(call(*(array[indices] for array in (matrices, *starts)))))
+    return np.concatenate(results)[: len(matrices)]
 
 
 def measure_errors(rotation: np.ndarray, judged: Judged) -> Errors:

@@ -23,12 +23,9 @@ class Judged(NamedTuple):
 
 
 def judge(sets: Mapping[str, np.ndarray], dtype: str, whole: str | None = None) -> Judged:
-    """Returns the matrices, rounded to a dtype, as one batch with their nearest rotations.
+    """Returns sets of matrices, shape (n, 3, 3), rounded to a dtype, as one batch with their nearest rotations.
 
-    Args:
-        sets: Arrays of shape (n, 3, 3) by name. Rounding to float32 may overflow to infinity.
-        dtype: "float32" or "float64".
-        whole: A name for the set of all matrices, or None.
+    Rounding to float32 may overflow to infinity. `whole` is a name for the set of all matrices, if wanted.
     """
     with np.errstate(over="ignore", under="ignore"):
         parts = [array.astype(dtype) for array in sets.values()]

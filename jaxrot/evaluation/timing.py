@@ -14,7 +14,6 @@ SHORTEST_SAMPLE_S = 2e-3
 FEWEST_ROUNDS = 3
 MOST_ROUNDS = 31
 
-
 Name = TypeVar("Name", bound=Hashable)
 
 
@@ -69,15 +68,9 @@ def interleave(
     """Returns the seconds per call of every sample, and the number of calls in a sample, by name.
 
     Every function runs once in a round. Interleaving spreads drift (clock rate, temperature, other load) evenly. The
-    random order keeps any function from always inheriting the cache state of the same predecessor.
-
-    Args:
-        calls: The functions by name; each returns when its work is done.
-        budget_s: A round starts only if fewer seconds are spent.
-        clock: A monotonic clock in seconds.
-        shortest_sample_s: A sample repeats a call until it takes about that long.
-        fewest_rounds: Rounds to run even beyond the budget.
-        most_rounds: Rounds to run at most.
+    random order keeps any function from always inheriting the cache state of the same predecessor. A function returns
+    when its work is done. A sample repeats a call until it takes about `shortest_sample_s`. After `fewest_rounds`, a
+    round starts only if fewer seconds than `budget_s` are spent.
     """
     repeats = {}
     for name, call in calls.items():
@@ -110,14 +103,10 @@ def time_methods(
     budget_s: float,
     starts: np.ndarray | None = None,
 ) -> list[Timing]:
-    """Returns the time of each method on the same batch, from interleaved rounds.
+    """Returns the time of each method on the same batch, which the matrices fill, from interleaved rounds.
 
-    Args:
-        compiled: The methods, compiled for this batch size and the matrices' dtype.
-        matrices: Shape (n, 3, 3), n > 0; they fill the batch.
-        batch: Matrices in a call.
-        budget_s: Seconds to spend, roughly.
-        starts: One rotation for each matrix, if the methods take a start.
+    The methods are compiled for this batch size and the matrices' dtype. `starts` holds one rotation for each matrix,
+    if the methods take a start.
     """
     arrays = [matrices] if starts is None else [matrices, starts]
     # Both arrays have the same length and get the same random order, so that every matrix keeps its start.
@@ -126,22 +115,10 @@ def time_methods(
     samples, repeats = interleave(calls, budget_s=budget_s)
     timings = []
     for name, seconds in samples.items():
-        nanoseconds = np.asarray(seconds) * 1e9 / batch
-        first, median, third = np.quantile(nanoseconds, [0.25, 0.5, 0.75]).tolist()
-        timings.append(
-            Timing(
-                method=name,
-                dtype=matrices.dtype.name,
-                batch=batch,
-                median_ns=median,
-                quartile_1_ns=first,
-                quartile_3_ns=third,
-                fastest_ns=float(nanoseconds.min()),
-                samples=len(seconds),
-                calls_per_sample=repeats[name],
-                compile_s=compiled[name].compile_s,
-            )
-        )
+        fastest, first, median, third = (np.quantile(seconds, [0, 0.25, 0.5, 0.75]) * 1e9 / batch).tolist()
+        times = {"median_ns": median, "quartile_1_ns": first, "quartile_3_ns": third, "fastest_ns": fastest}
+        counts = {"batch": batch, "samples": len(seconds), "calls_per_sample": repeats[name]}
+        timings.append(Timing(name, matrices.dtype.name, **times, **counts, compile_s=compiled[name].compile_s))
     return timings
 
 
