@@ -53,12 +53,7 @@ class Sample(NamedTuple):
 
 
 def take_sample(matrices: ArrayLike, previous: ArrayLike | None, dtype: DTypeLike | None) -> Sample:
-    """Validates the arguments of `recommend`, surveys every matrix and draws the sample.
-
-    Raises:
-        ValueError: Wrong shape or dtype, no finite matrix, or `previous` does not hold rotations.
-        TypeError: Arrays that are not real, or traced.
-    """
+    """Validates the arguments of `recommend`, surveys every matrix and draws the sample."""
     checked = computing(jnp.asarray(check_matrix(matrices, "matrices"))).value
     for name, array in (("matrices", checked), ("previous", previous)):
         if isinstance(array, core.Tracer):
@@ -106,7 +101,7 @@ def _check_dtype(dtype: DTypeLike) -> np.dtype:
         raise TypeError(f"dtype must be float32 or float64; got {dtype!r}") from None
     if wanted.name not in ("float32", "float64"):
         raise ValueError(f"dtype must be float32 or float64; got {wanted.name}")
-    if wanted.name == "float64" and not jnp.asarray(0.0).dtype == wanted:
+    if wanted.name == "float64" and jnp.asarray(0.0).dtype != wanted:
         raise ValueError(
             "dtype float64 needs jax.config.update('jax_enable_x64', True) at the start of the program; it is off"
         )

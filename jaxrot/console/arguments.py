@@ -26,11 +26,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def path(word: str) -> Path:
-    """A file or a folder. An empty word, such as a shell variable that is not set, would be the current folder.
-
-    Raises:
-        argparse.ArgumentTypeError: The word is empty.
-    """
+    """Returns a file or a folder. An empty word, such as a shell variable that is not set, is refused."""
     if not word:
+        # It would be the current folder.
         raise argparse.ArgumentTypeError("the name is empty; expected that of a file or a folder")
     return Path(word)

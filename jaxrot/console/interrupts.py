@@ -19,18 +19,12 @@ _REPEAT_S = 0.05
 
 
 class Interrupts:
-    """The effect of Ctrl-C: it raises KeyboardInterrupt until `hold`, and is only noted from then on.
-
-    Attributes:
-        pending: Ctrl-C was pressed and has had no effect yet.
-        has_results: The command has results to lose.
-        handled_at: When Python last saw a Ctrl-C, on the monotonic clock.
-    """
+    """The effect of Ctrl-C: it raises KeyboardInterrupt until `hold`, and is only noted from then on."""
 
     def __init__(self) -> None:
-        self.pending = False
-        self.has_results = False
-        self.handled_at = -math.inf
+        self.pending = False  # Ctrl-C was pressed and has had no effect yet
+        self.has_results = False  # The command has results to lose
+        self.handled_at = -math.inf  # When Python last saw a Ctrl-C, on the monotonic clock
         self._is_raising = True
 
     def handle(self, number: int, frame: FrameType | None) -> None:
@@ -79,8 +73,7 @@ class Interrupts:
 def watched(*, owns_process: bool = False) -> Iterator[Interrupts]:
     """Handles Ctrl-C for one command, in the main thread and unless the process is a background job.
 
-    Args:
-        owns_process: The process runs only the command. It is ended if a Ctrl-C does not reach Python.
+    A process that runs only the command, `owns_process`, is ended if a Ctrl-C does not reach Python.
     """
     interrupts = Interrupts()
     before = signal.getsignal(signal.SIGINT)
