@@ -24,3 +24,16 @@ def _programs_are_freed():
     """A process may hold 65,530 memory maps on Linux, a compiled program takes dozens, and JAX keeps all of them."""
     yield
     jax.clear_caches()
+
+
+@pytest.fixture(params=["float32", "float64"])
+def dtype(request):
+    """A test that names it runs in both."""
+    return request.param
+
+
+@pytest.fixture
+def without_x64():
+    jax.config.update("jax_enable_x64", False)
+    yield
+    jax.config.update("jax_enable_x64", True)

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from jaxrot.families import FAMILIES
+
 POINTS = {
     "rotation": np.eye(3),
     "rank two": np.diag([1, 0.7, 0]),
@@ -19,6 +21,23 @@ def turned(axis, angle):
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def stretched(s, count=50, dtype="float32"):
+    """Matrices with these singular values, the last one signed, between two random rotations."""
+    left, right = (FAMILIES["rotation"].sample(count, dtype=np.float64, seed=seed).matrices for seed in (1, 2))
+    return (left @ (np.asarray(s)[..., None, :] * right)).astype(dtype)
+
+
+def quaternion_rotations(wxyz):
+    """The rotations of quaternions of any length, shape (4, n)."""
+    w, x, y, z = wxyz / np.linalg.norm(wxyz, axis=0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def central_difference(function, matrix, tangent, h=1e-5):

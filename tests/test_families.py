@@ -8,7 +8,6 @@ import pytest
 from jaxrot.evaluation import reference
 from jaxrot.families import FAMILIES, LARGE_BATCH, Family, half_turn_starts, with_non_finite
 
-DTYPES = (np.float32, np.float64)
 COUNT = 96
 NAMES = """zero identity minus_identity reflection half_turn swap signed_permutation small_integers gaussian rotation
 scaled_rotation drifted_rotation noisy_rotation_0.1 noisy_rotation_0.3 noisy_rotation_0.5 log_uniform equal_large
@@ -19,7 +18,6 @@ scale_mixed subnormal"""
 WANTED = NAMES.split()
 
 every_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
-every_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=lambda dtype: dtype.__name__)
 
 
 def singular_value_error(matrices, stated):
@@ -43,35 +41,24 @@ def test_every_named_family_is_there():
         assert "\n" not in family.description
 
 
-@every_dtype
 @every_family
-def test_samples_are_finite_sorted_and_of_the_dtype(family, dtype):
+def test_samples_are_finite_sorted_of_the_dtype_and_have_their_singular_values(family, dtype):
     matrices, s = family.sample(COUNT, dtype)
+    assert singular_value_error(matrices, s) <= 1
     assert matrices.shape == (COUNT, 3, 3)
-    assert matrices.dtype == dtype
-    assert s.shape == (COUNT, 3)
-    assert s.dtype == np.float64
+    assert (matrices.dtype, s.dtype, s.shape) == (dtype, np.float64, (COUNT, 3))
     assert np.isfinite(matrices).all()
     assert np.isfinite(s).all()
-    assert (s[:, 0] >= s[:, 1]).all()
-    assert (s[:, 1] >= np.abs(s[:, 2])).all()
+    assert ((s[:, 0] >= s[:, 1]) & (s[:, 1] >= np.abs(s[:, 2]))).all()
     matrices[:] = 0  # writable, and of its own
     assert family.sample(0, dtype).matrices.shape == (0, 3, 3)
     assert family.sample(0, dtype).singular_values.shape == (0, 3)
 
 
-@every_dtype
-@every_family
-def test_singular_values_are_those_of_the_matrices(family, dtype):
-    matrices, s = family.sample(COUNT, dtype)
-    assert singular_value_error(matrices, s) <= 1
-
-
-def test_a_wrong_singular_value_is_noticed():
-    for dtype in DTYPES:
-        matrices, s = FAMILIES["gaussian"].sample(COUNT, dtype)
-        assert singular_value_error(matrices, s * (1 + 64 * np.finfo(dtype).eps)) > 1
-        assert singular_value_error(matrices, s * (1, 1, -1)) > 1
+def test_a_wrong_singular_value_is_noticed(dtype):
+    matrices, s = FAMILIES["gaussian"].sample(COUNT, dtype)
+    assert singular_value_error(matrices, s * (1 + 64 * np.finfo(dtype).eps)) > 1
+    assert singular_value_error(matrices, s * (1, 1, -1)) > 1
 
 
 @every_family
@@ -99,17 +86,12 @@ def test_a_large_batch_is_large():
     assert FAMILIES["noisy_rotation_0.1"].sample(LARGE_BATCH).matrices.shape == (LARGE_BATCH, 3, 3)
 
 
-@every_dtype
 def test_the_explicit_matrices_are_what_they_are_called(dtype):
     diagonals = {"identity": (1, 1, 1), "minus_identity": (-1, -1, -1), "reflection": (1, 1, -1)}
     for name, diagonal in {"zero": (0, 0, 0), "half_turn": (1, -1, -1), **diagonals}.items():
         assert (FAMILIES[name].sample(2, dtype).matrices == np.diag(diagonal)).all()
-    for name, s in {
-        "swap": (1, 1, 1),
-        "reflection": (1, 1, -1),
-        "minus_identity": (1, 1, -1),
-        "zero": (0, 0, 0),
-    }.items():
+    values = {"swap": (1, 1, 1), "reflection": (1, 1, -1), "minus_identity": (1, 1, -1), "zero": (0, 0, 0)}
+    for name, s in values.items():
         assert (FAMILIES[name].sample(2, dtype).singular_values == s).all()
     swap = FAMILIES["swap"].sample(1, dtype).matrices[0]
     assert (swap @ (1, 2, 3) == (2, 1, -3)).all()
@@ -121,7 +103,6 @@ def test_the_explicit_matrices_are_what_they_are_called(dtype):
     assert (s[:, 2] < 0).all()
 
 
-@every_dtype
 def test_condition_numbers_reach_as_far_as_they_say(dtype):
     eps = float(np.finfo(dtype).eps)
     for name in ("zero", "minus_identity", "reflection", "single_entry", "exact_tie"):
@@ -139,7 +120,6 @@ def test_condition_numbers_reach_as_far_as_they_say(dtype):
     assert (condition("minus_rotation", dtype) > 0.1 / eps).all()
 
 
-@every_dtype
 def test_neighbours_of_vanishing_gap_are_half_a_turn_apart(dtype):
     matrices, s = FAMILIES["vanishing_gap"].sample(COUNT, dtype)
     r = reference.reference_rotation(matrices)
@@ -150,17 +130,13 @@ def test_neighbours_of_vanishing_gap_are_half_a_turn_apart(dtype):
     np.testing.assert_allclose((r[::2] * r[1::2]).sum(axis=(1, 2))[resolved].astype(float), -1, atol=0.05)
 
 
-@every_dtype
 def test_near_half_turn_has_a_quaternion_with_w_about_0(dtype):
-    trace = np.trace(
-        reference.reference_rotation(FAMILIES["near_half_turn"].sample(COUNT, dtype).matrices), axis1=1, axis2=2
-    )
-    w = np.sqrt(np.abs(trace + 1)) / 2
+    rotation = reference.reference_rotation(FAMILIES["near_half_turn"].sample(COUNT, dtype).matrices)
+    w = np.sqrt(np.abs(np.trace(rotation, axis1=1, axis2=2) + 1)) / 2
     assert w.max() < 0.01
     assert (w[::3] < 1e-3).all()
 
 
-@every_dtype
 def test_scales_reach_the_ends_of_the_dtype(dtype):
     info = np.finfo(dtype)
     largest = {name: np.abs(FAMILIES[name].sample(COUNT, dtype).matrices).max(axis=(1, 2)) for name in WANTED}
@@ -174,15 +150,12 @@ def test_scales_reach_the_ends_of_the_dtype(dtype):
     assert np.ptp(np.log10(largest["scale_mixed"])) > 40
 
 
-@every_dtype
 def test_half_turn_starts_have_no_torque_and_their_neighbours_a_little(dtype):
     matrices = FAMILIES["gaussian"].sample(COUNT, dtype).matrices
     solved = reference.solve(matrices)
     eps = np.finfo(dtype).eps
-    for a, r, axes in (
-        (matrices, solved.rotation, solved.right),
-        (np.eye(3, dtype=dtype)[None], np.eye(3)[None], None),
-    ):
+    one = np.eye(3, dtype=dtype)[None]
+    for a, r, axes in ((matrices, solved.rotation, solved.right), (one, np.eye(3)[None], None)):
         starts = half_turn_starts(r.astype(dtype), axes)
         assert starts.shape == (9, *a.shape)
         assert starts.dtype == dtype
@@ -206,5 +179,4 @@ def test_with_non_finite_leaves_the_neighbours_alone():
     np.testing.assert_array_equal(changed[~bad], matrices[~bad])
     assert (np.count_nonzero(~np.isfinite(changed[bad]), axis=(1, 2)) == 1).all()
     assert np.isnan(changed).any()
-    assert (changed == np.inf).any()
-    assert (changed == -np.inf).any()
+    assert {np.inf, -np.inf} <= set(changed.flat)

@@ -96,7 +96,6 @@ def test_peers_get_nothing_that_is_not_finite(tmp_path, monkeypatch):
     assert {entry.name for entry in found.contenders if entry.families_no_number} >= {"jnp.linalg.eigh"}
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_davenports_matrix_may_overflow(dtype):
     largest = float(np.finfo(dtype).max)
     matrices = np.stack([np.eye(3), 0.9 * largest * np.eye(3)]).astype(dtype)

@@ -9,11 +9,9 @@ from differences import DISTINCT, POINTS, assert_is_derivative
 from jaxrot import nearest_rotation, rotation_variant_svd, signed_singular_values
 from jaxrot.evaluation import reference
 
-DTYPES = ["float32", "float64"]
 distinct = pytest.mark.parametrize("matrix", DISTINCT.values(), ids=DISTINCT.keys())
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_the_factors_are_rotations_in_order_and_make_the_matrix(dtype):
     batch = family_batch(dtype)
     eps, tiny = np.finfo(dtype).eps, np.finfo(dtype).tiny
@@ -32,7 +30,6 @@ def test_the_factors_are_rotations_in_order_and_make_the_matrix(dtype):
     assert_within(error, 32 * eps, names, "product of the factors")
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_the_factors_make_the_nearest_rotation(dtype):
     batch = family_batch(dtype)
     where = batch.condition < 1e3
@@ -54,7 +51,6 @@ def test_singular_values_alone_are_the_same_and_leave_the_factors_out():
     assert alone.memory_analysis().output_size_in_bytes < 0.2 * whole.memory_analysis().output_size_in_bytes
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.exhaustive
 def test_singular_values_alone_are_right_near_rank_one(dtype):
     """What decides between the axes of two nearly equal eigenvalues must decide alike for both."""

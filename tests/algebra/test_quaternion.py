@@ -145,7 +145,6 @@ def test_the_nearest_quaternion_is_that_of_the_nearest_rotation():
     np.testing.assert_allclose(to_matrix(quaternion), nearest_rotation(matrices), atol=4e-15)
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_the_nearest_quaternion_is_that_of_the_nearest_rotation_on_every_family(dtype):
     """Jitted: where a choice, of a column or of a sign, hangs on rounding, all components must choose alike."""
     batch = family_batch(dtype)

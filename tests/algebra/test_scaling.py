@@ -1,14 +1,10 @@
 import jax
 import numpy as np
-import pytest
 
 from jaxrot import nearest_rotation
 from jaxrot._algebra import scaling
 
-DTYPES = ["float32", "float64"]
 
-
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_the_factor_is_the_power_of_two_that_leads_into_two_to_four(dtype):
     info = np.finfo(dtype)
     exponents = np.arange(info.minexp, info.maxexp)
@@ -21,7 +17,6 @@ def test_the_factor_is_the_power_of_two_that_leads_into_two_to_four(dtype):
     assert (factor >= info.tiny).all()
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_the_factor_of_what_has_none_is_the_largest_or_zero(dtype):
     info = np.finfo(dtype)
     special = np.array([0, info.smallest_subnormal, np.inf, np.nan], dtype)
@@ -29,7 +24,6 @@ def test_the_factor_of_what_has_none_is_the_largest_or_zero(dtype):
     np.testing.assert_array_equal(scaling.power_of_two_factor(special), np.array([largest, largest, 0, 0], dtype))
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_a_power_of_two_changes_no_bit(dtype):
     matrices = np.random.default_rng(0).standard_normal((64, 3, 3)).astype(dtype)
     rotation = np.asarray(nearest_rotation(matrices))

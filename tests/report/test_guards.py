@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from differences import quaternion_rotations
 
 from jaxrot import STEPS, _refine, nearest_rotation
 from jaxrot.evaluation.ground_truth import judge
@@ -137,15 +138,8 @@ def test_what_is_left_out_is_not_in_the_program(name, guard):
 def test_starts_are_as_far_off_as_they_say():
     posed = pose({"gaussian": FAMILIES["gaussian"].sample(4, dtype=np.float64).matrices}, "float64")
     nearest = np.asarray(posed.judged.solution.rotation, float)
-    w, x, y, z = posed.starts.T
-    start = np.array(
-        [
-            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-        ]
-    ).transpose(2, 0, 1)
-    cosine = (np.einsum("nij,nij->n", nearest, start) - 1) / 2
+    np.testing.assert_allclose(np.linalg.norm(posed.starts, axis=1), 1)
+    cosine = (np.einsum("nij,nij->n", nearest, quaternion_rotations(posed.starts.T)) - 1) / 2
     for kind, expected in ((NEAR, 45), (FAR, 135), (NEAREST, 0), (HALF_TURN, 180)):
         np.testing.assert_allclose(cosine[posed.kind == kind], np.cos(np.radians(expected)), atol=1e-14)
         assert (posed.kind == kind).sum() == 4

@@ -47,7 +47,6 @@ def where_they_differ(one, other):
     return rows.min() / height, rows.max() / height, columns.min() / width, columns.max() / width
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_colors_follow_the_excess_and_the_failures_have_their_own(dtype):
     excess = np.array([0, 1, 1.01, 1e2, 1e6, 1e20, 1e20, np.inf])
     kind = np.array([0, 0, 1, 1, 1, 1, Kind.NOT_A_ROTATION, Kind.NOT_FINITE], np.int8)

@@ -39,7 +39,6 @@ def test_every_family_is_in_one_case():
     assert sorted(families) == sorted(FAMILIES)
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize(
     ("orthogonality", "lost_trace", "expected"),
     [

@@ -11,7 +11,6 @@ from jaxrot.evaluation import reference
 from jaxrot.evaluation.accuracy import run_in_chunks
 from jaxrot.report.measure.stability import Kind, map_conditions, map_scales, summarise_conditions, summarise_scales
 
-DTYPES = ("float32", "float64")
 STEPS = 8
 A_CELL = 16
 
@@ -60,7 +59,6 @@ def test_the_grid_is_the_region_with_its_lines_and_corners():
         assert {(t, t), (t, -t), (t, 0.0), (1.0, t), (1.0, -t)} <= points
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_every_cell_has_its_singular_values(dtype):
     matrices, found = matrices_given(dtype)
     wanted = np.stack([np.ones_like(found.s2), found.s2, found.s3], -1)
@@ -69,7 +67,6 @@ def test_every_cell_has_its_singular_values(dtype):
     assert matrices.dtype == dtype
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_some_matrices_have_them_to_the_last_bit(dtype):
     matrices, found = matrices_given(dtype)
     exact = -np.sort(-np.abs(matrices[:, -4:].reshape(-1, 4, 9)), axis=-1)
@@ -78,7 +75,6 @@ def test_some_matrices_have_them_to_the_last_bit(dtype):
     assert not exact[..., 3:].any()
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize(
     ("change", "kind"),
     [
@@ -131,7 +127,6 @@ def test_where_r_is_not_unique_trace_and_torque_are_judged(change):
     assert cells.excess[number] > 1
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_an_excess_beyond_one_and_a_broken_contract_are_the_same(dtype):
     random = np.random.default_rng(0)
 
@@ -183,7 +178,6 @@ def test_the_shares_are_json_and_add_up():
     assert shares["not_a_rotation"] == 1 / len(found.s2)
 
 
-@pytest.mark.parametrize("dtype", DTYPES)
 def test_the_default_method_keeps_the_contract_on_both_maps(dtype):
     call = jax.jit(jaxrot.nearest_rotation)
 

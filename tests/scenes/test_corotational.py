@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from differences import turned
 from jax import lax
 
 from jaxrot import refine_rotation
@@ -17,6 +18,7 @@ from jaxrot.scenes.tetrahedra import box
 BLOCK = box((3, 3, 3), (1.0, 1.0, 1.0))
 STATIC = 1e4  # s, a time step so long that inertia does nothing
 NO_GRAVITY = (0.0, 0.0, 0.0)
+TURN = turned([1, 2, 3], 2.0)
 
 
 @functools.cache
@@ -42,12 +44,6 @@ def rough_rollout(state, parameters):
     return rollout(300, gravity=False, conjugate_gradients=30, tolerance=1e-3)(state, parameters)
 
 
-def turn(angle):
-    axis = np.array([1, 2, 3]) / 14**0.5
-    cross = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-
-
 def gradients_of(state, parameters):
     return np.asarray(elasticity.deformation_gradients(state.positions, parameters.elements))
 
@@ -55,7 +51,7 @@ def gradients_of(state, parameters):
 def test_the_patch_test_far_turned():
     inside = ((BLOCK.vertices > 0) & (BLOCK.vertices < 1)).all(axis=1)
     state, parameters = build(*BLOCK, young=1e6, time_step=STATIC, gravity=NO_GRAVITY, fixed=~inside, dtype="float64")
-    deformation = turn(2.0) @ np.array([[1.1, 0.05, 0], [0, 0.95, 0.1], [0, 0, 1.02]])
+    deformation = TURN @ np.array([[1.1, 0.05, 0], [0, 0.95, 0.1], [0, 0, 1.02]])
     exact = BLOCK.vertices @ deformation.T
     noise = np.random.default_rng(0).normal(size=exact.shape) * 0.1
     start = state._replace(positions=jnp.asarray(exact + inside[:, None] * noise))
@@ -68,7 +64,7 @@ def test_the_patch_test_far_turned():
 
 def test_a_rigid_motion_makes_no_ghost_force():
     state, parameters = build(*BLOCK, young=1e6, dtype="float32")
-    moved = jnp.asarray(BLOCK.vertices @ turn(2.0).T + 1, jnp.float32)
+    moved = jnp.asarray(BLOCK.vertices @ TURN.T + 1, jnp.float32)
 
     def force(rotations):
         gradients = elasticity.deformation_gradients(moved, parameters.elements)
@@ -80,7 +76,7 @@ def test_a_rigid_motion_makes_no_ghost_force():
     assert ghost < 1e-6 * linear
 
     state, parameters = build(*BLOCK, young=1e6, time_step=1.0, gravity=NO_GRAVITY, dtype="float64")
-    state = state._replace(positions=state.positions @ turn(2.0).T + 1)
+    state = state._replace(positions=state.positions @ TURN.T + 1)
     assert np.abs(settle(state, parameters).positions - state.positions).max() < 1e-6
 
 

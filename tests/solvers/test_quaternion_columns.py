@@ -1,6 +1,7 @@
 """Sarabandi et al. 2020, section IV: what to make of the four columns of eq. (27)."""
 
 import numpy as np
+from differences import quaternion_rotations
 
 from jaxrot import nearest_rotation
 from jaxrot.evaluation import reference
@@ -37,15 +38,7 @@ def test_the_simple_average_fails_where_the_components_add_up_to_zero():
 
 def test_the_simple_average_is_no_worse_where_all_components_are_positive():
     """The flaw is the signs alone."""
-    q = np.random.default_rng(0).uniform(0.5, 1, (4, 200))
-    w, x, y, z = q / np.linalg.norm(q, axis=0)
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    ).transpose(2, 0, 1)
+    rotation = quaternion_rotations(np.random.default_rng(0).uniform(0.5, 1, (4, 200)))
     noisy = rotation + np.random.default_rng(1).uniform(-0.01, 0.01, rotation.shape)
     solved = [np.asarray(nearest_rotation(noisy, method=name)) for name in ("simple_average", "quaternion_average")]
     np.testing.assert_allclose(solved[0], solved[1], atol=1e-15)
