@@ -26,7 +26,7 @@ def turned(axis, angle):
 def stretched(s, count=50, dtype="float32"):
     """Matrices with these singular values, the last one signed, between two random rotations."""
     left, right = (FAMILIES["rotation"].sample(count, dtype=np.float64, seed=seed).matrices for seed in (1, 2))
-    return (left @ (np.asarray(s)[..., None, :] * right)).astype(dtype)
+    return ((left * np.asarray(s)[..., None, :]) @ right).astype(dtype)
 
 
 def quaternion_rotations(wxyz):

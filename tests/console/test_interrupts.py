@@ -8,19 +8,14 @@ import signal
 import threading
 import time
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import falling_point, measure_nothing
 
 from jaxrot.__main__ import main
 from jaxrot._recommend import candidates
 from jaxrot.console.interrupts import Interrupts, watched
 from jaxrot.report import command as report
-from jaxrot.report.data import ReportData
-from jaxrot.report.inputs import Input
-from jaxrot.report.measure.results import Results
-from jaxrot.report.show import document, records
-from jaxrot.scenes.scene import Scene
 from jaxrot.simulate import animation, recording
 from jaxrot.simulate import command as simulate
 from jaxrot.simulate.catalogue import Entry
@@ -69,24 +64,11 @@ def test_measuring_is_interrupted_in_one_line(command, interrupt, tmp_path, caps
     assert os.listdir() == ["own.npy"]
 
 
-def _falling(points=lambda state: jnp.broadcast_to(state, (1, 3))):
-    return Scene(
-        title="A point that falls",
-        state=jnp.float32(0.0),
-        step=lambda state: state - 1,
-        health=lambda state: {"height (m)": state},
-        points=points,
-        lines=np.empty((0, 2), dtype=np.intp),
-        step_seconds=0.1,
-        steps=3,
-    )
-
-
 @pytest.fixture
 def falling(tmp_path, monkeypatch):
     """Runs the command on that scene: status, and files in the folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(simulate, "SCENES", {"falling": Entry(_falling, None, "")})
+    monkeypatch.setattr(simulate, "SCENES", {"falling": Entry(falling_point, None, "")})
 
     def run(*words):
         status = main(["simulate", "falling", "--out", "out", *words])
@@ -96,7 +78,7 @@ def falling(tmp_path, monkeypatch):
 
 
 def test_before_the_first_step_nothing_is_finished(falling, monkeypatch, capsys):
-    monkeypatch.setattr(simulate, "SCENES", {"falling": Entry(lambda: _falling(_interrupted), None, "")})
+    monkeypatch.setattr(simulate, "SCENES", {"falling": Entry(lambda: falling_point(_interrupted), None, "")})
     assert falling() == (130, None)
     assert capsys.readouterr().err == f"python -m jaxrot simulate: {NOTHING}"
 
@@ -109,6 +91,7 @@ def test_the_steps_before_an_interruption_are_drawn_and_written(falling, monkeyp
     monkeypatch.setattr(simulate, "progress", progress)
     assert falling() == (130, ["animation.gif", "health.csv", "health.png", "run.json"])
     assert "Interrupted after 2 of 3 steps" in capsys.readouterr().out
+    assert json.loads(pathlib.Path("out/run.json").read_text())["steps"] == 2
 
 
 @pytest.mark.parametrize(
@@ -163,13 +146,8 @@ def test_a_long_stretch_between_two_frames_is_interrupted(monkeypatch):
 
 
 def test_a_report_is_written_without_pictures_where_the_drawing_is_interrupted(tmp_path, monkeypatch, capsys):
-    nothing = ReportData(given=Input("none", {}), dtypes=(), results=Results([], [], ()))
-    monkeypatch.setattr(report, "measure", lambda *arguments: nothing)
+    measure_nothing(monkeypatch)
     monkeypatch.setattr(report, "draw_pictures", _interrupted)
-    for module, name in (
-        (document, "as_report_markdown"), (document, "as_terminal_text"), (records, "as_json"),
-    ):  # fmt: skip
-        monkeypatch.setattr(module, name, lambda *arguments: "text")
     assert main(["report", "--methods", "svd", "--out", str(tmp_path / "out")]) == 130
     assert "Interrupted while drawing, without pictures." in capsys.readouterr().out
     assert sorted(os.listdir(tmp_path / "out")) == ["report.csv", "report.html", "report.json", "report.md"]

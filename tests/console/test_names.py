@@ -4,21 +4,9 @@ import os
 
 import numpy as np
 import pytest
+from commands import refused
 
-from jaxrot.__main__ import main
 from jaxrot.console.errors import UserError, one_line, shown
-
-
-def _refused(words, capsys):
-    try:
-        status = main(words)
-    except SystemExit as error:
-        status = error.code
-    shown = capsys.readouterr()
-    assert (status, shown.out) == (2, "")
-    assert shown.err.endswith("\n")
-    assert shown.err[:-1].isprintable(), shown.err
-    return shown.err
 
 
 @pytest.mark.parametrize("character", ["\n", "\r", "\t", "\x1b", "\x85", "\u2028", "\u202e", "\udcff"])
@@ -79,7 +67,7 @@ def test_a_newline_in_a_name_does_not_break_the_line(words, tmp_path, monkeypatc
     np.savez("shape\n.npz", **{"a\nb": np.ones(3)})
     np.savez("names\n.npz", **{"a\nb": np.ones((1, 3, 3)), "c": np.ones((1, 3, 3))})
     before = sorted(os.listdir())
-    assert "\\n" in _refused(words, capsys)
+    assert "\\n" in refused(words, capsys)
     assert sorted(os.listdir()) == before
 
 
@@ -99,7 +87,7 @@ def test_a_newline_in_a_name_does_not_break_the_line(words, tmp_path, monkeypatc
 )
 def test_an_empty_name_is_not_the_current_folder(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    text = _refused([*words, ""], capsys)
+    text = refused([*words, ""], capsys)
     assert "the name is empty" in text
     assert (words[-1] if words[-1].startswith("--") else "FILE") in text
     assert os.listdir() == []
@@ -108,5 +96,5 @@ def test_an_empty_name_is_not_the_current_folder(words, tmp_path, monkeypatch, c
 @pytest.mark.parametrize("option", ["--dtype", "--methods", "--batch"])
 def test_an_empty_word_is_not_the_default(option, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert f"{option} ''" in _refused(["report", option, ""], capsys)
-    assert "goes without" in _refused(["report", "--bench", option, ""], capsys)
+    assert f"{option} ''" in refused(["report", option, ""], capsys)
+    assert "goes without" in refused(["report", "--bench", option, ""], capsys)

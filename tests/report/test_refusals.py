@@ -4,13 +4,9 @@ import sys
 
 import numpy as np
 import pytest
+from commands import measure_nothing, refused
 
-from jaxrot.__main__ import main
 from jaxrot.report import command
-from jaxrot.report.data import ReportData
-from jaxrot.report.inputs import Input
-from jaxrot.report.measure.results import Results
-from jaxrot.report.show import document, records
 
 
 def _save_text(path):
@@ -62,26 +58,11 @@ BAD_FILES = {
 }
 
 
-def _refused(words, capsys):
-    """What the command says on stderr when it exits with status 2."""
-    try:
-        status = main([str(word) for word in words])
-    except SystemExit as error:
-        status = error.code
-    shown = capsys.readouterr()
-    assert status == 2
-    assert shown.out == ""
-    assert shown.err.count("\n") == 1, shown.err
-    assert shown.err.endswith("\n")
-    assert "Traceback" not in shown.err
-    return shown.err
-
-
 @pytest.mark.parametrize("kind", BAD_FILES)
 def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
     save, expected = BAD_FILES[kind]
     save(tmp_path / "bad.npy")
-    text = _refused(["report", "--input", tmp_path / "bad.npy", "--out", tmp_path / "out"], capsys)
+    text = refused(["report", "--input", tmp_path / "bad.npy", "--out", tmp_path / "out"], capsys)
     assert expected in text
     assert "expected a .npy or .npz file with a real array of shape (..., 3, 3)" in text
     assert not (tmp_path / "out").exists()
@@ -93,21 +74,14 @@ def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
         (["--methods", "svd,svdd"], "unknown 'svdd'; expected some of singular_pair,"),
         (["--methods", ""], "unknown ''"),
         (["--dtype", "float16"], "expected one of float32, float64, both"),
-        (["--batch", "10,x"], "expected whole numbers from 1"),
-        (["--batch", "0"], "expected whole numbers from 1"),
-        (["--batch", "-5"], "expected whole numbers from 1"),
-        (["--batch", "100000000000"], "expected whole numbers from 1"),
-        (["--batch", ""], "expected whole numbers from 1"),
-        (
-            ["--compare", "missing.json"],
-            "missing.json: cannot be read (no such file or directory)",
-        ),
+        *((["--batch", word], "expected whole numbers from 1") for word in ("10,x", "0", "-5", "100000000000", "")),
+        (["--compare", "missing.json"], "missing.json: cannot be read (no such file or directory)"),
         (["--no-such-option"], "unrecognized arguments: --no-such-option"),
         (["--methods"], "expected one argument"),
     ],
 )
 def test_a_bad_option_is_refused_in_one_line(words, expected, tmp_path, capsys):
-    assert expected in _refused(["report", "--out", tmp_path / "out", *words], capsys)
+    assert expected in refused(["report", "--out", tmp_path / "out", *words], capsys)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -118,18 +92,18 @@ def test_a_bad_option_is_refused_in_one_line(words, expected, tmp_path, capsys):
 def test_a_file_that_is_no_report_is_not_compared_with(text, expected, tmp_path, capsys):
     (tmp_path / "old.json").write_bytes(text.encode("latin-1"))
     words = ["report", "--compare", tmp_path / "old.json", "--out", tmp_path / "out"]
-    assert expected in _refused(words, capsys)
+    assert expected in refused(words, capsys)
     assert not (tmp_path / "out").exists()
 
 
 def test_no_command_is_refused_in_one_line(capsys):
-    assert "required: COMMAND" in _refused([], capsys)
+    assert "required: COMMAND" in refused([], capsys)
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "file/far/below"])
-def test_a_file_in_the_way_of_out_is_refused(place, tmp_path, capsys):
+def test_a_file_in_the_way_of_out_isrefused(place, tmp_path, capsys):
     (tmp_path / "file").write_text("precious")
-    text = _refused(["report", "--out", tmp_path / place], capsys)
+    text = refused(["report", "--out", tmp_path / place], capsys)
     assert "expected a folder, or a name for a new one" in text
     assert (tmp_path / "file").read_text() == "precious"
 
@@ -141,23 +115,17 @@ def test_an_unwritable_out_is_refused_before_anything_is_measured(tmp_path, caps
     # Permission bits do not stop an administrator, and the tests may be run by one.
     monkeypatch.setattr("jaxrot.console.output.tempfile.TemporaryFile", refuse)
     monkeypatch.setattr(command, "measure", lambda *arguments: pytest.fail("measured"))
-    assert "permission denied" in _refused(["report", "--out", tmp_path / "out"], capsys)
+    assert "permission denied" in refused(["report", "--out", tmp_path / "out"], capsys)
 
 
 def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
-    nothing = ReportData(given=Input("none", {}), dtypes=(), results=Results([], [], ()))
-    monkeypatch.setattr(command, "measure", lambda *arguments: nothing)
-    for module, name in (
-        (document, "as_report_markdown"), (document, "as_terminal_text"), (records, "as_json"),
-    ):  # fmt: skip
-        monkeypatch.setattr(module, name, lambda *arguments: "text")
-    monkeypatch.setattr(command, "draw_pictures", lambda content: {"pareto.png": b"picture"})
+    measure_nothing(monkeypatch)
 
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("jaxrot.console.output.Path.rename", fail)
-    text = _refused(["report", "--out", tmp_path / "out", "--methods", "svd"], capsys)
+    text = refused(["report", "--out", tmp_path / "out", "--methods", "svd"], capsys)
     assert "no space left on device" in text
     assert list(tmp_path.iterdir()) == []
 
@@ -166,6 +134,6 @@ def test_nothing_is_half_written(tmp_path, capsys, monkeypatch):
 def test_a_missing_extra_is_named_with_what_brings_it(is_terminal, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jaxrot.console.progress.importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
-    text = _refused(["report", "--out", tmp_path / "out"], capsys)
+    text = refused(["report", "--out", tmp_path / "out"], capsys)
     assert "pip install 'jaxrot[report]'" in text
     assert ("tqdm" in text) == is_terminal
