@@ -1,12 +1,17 @@
 """What belongs to the rotation, each function under its name and all of them in one."""
 
+import functools
+
 import jax.numpy as jnp
+import numpy as np
 
 from jaxrot import (
+    STEPS,
     arap_hessian,
     isotropic_energy,
     isotropic_map,
     polar_decomposition,
+    refine_rotation,
     rotation_gap,
     rotation_jacobian,
     rotation_variant_svd,
@@ -31,6 +36,10 @@ PARTS = {
     "isotropic_energy": lambda a: isotropic_energy(a, bounded),
     "isotropic_map": lambda a: isotropic_map(a, jnp.tanh),
 }
+
+
+EYE = np.eye(3, dtype=np.float32)
+REFINED = {f"refine_rotation {step}": functools.partial(refine_rotation, rotation=EYE, step=step) for step in STEPS}
 
 
 def decomposition(matrix):

@@ -1,15 +1,14 @@
 """JAX's checks report nothing on legal input."""
 
-import functools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from jax.experimental import checkify
-from parts import PARTS
+from marks import mostly_exhaustive
+from parts import PARTS, REFINED
 
-from jaxrot import STEPS, nearest_quaternion_wxyz, nearest_rotation, refine_rotation
+from jaxrot import nearest_quaternion_wxyz, nearest_rotation
 
 SPECIAL = {
     "0": np.zeros((3, 3)),
@@ -28,17 +27,9 @@ MATRICES = np.stack([*SPECIAL.values()]).astype(np.float32)
 FUNCTIONS = {
     "nearest_rotation": nearest_rotation,
     "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
-    **{
-        f"refine_rotation {step}": functools.partial(refine_rotation, rotation=np.eye(3, dtype=np.float32), step=step)
-        for step in STEPS
-    },
+    **REFINED,
     **PARTS,
 }
-EXHAUSTIVE = pytest.mark.exhaustive
-SHORT = {"nearest_rotation", "rotation_gap", "arap_hessian"}
-all_functions = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in SHORT else [EXHAUSTIVE]) for name in FUNCTIONS]
-)
 
 
 def gradient_of(function):
@@ -47,14 +38,11 @@ def gradient_of(function):
 
 @pytest.fixture
 def debugging():
-    jax.config.update("jax_debug_nans", True)
-    jax.config.update("jax_debug_infs", True)
-    yield
-    jax.config.update("jax_debug_nans", False)
-    jax.config.update("jax_debug_infs", False)
+    with jax.debug_nans(True), jax.debug_infs(True):
+        yield
 
 
-@all_functions
+@pytest.mark.parametrize("name", mostly_exhaustive(FUNCTIONS, "nearest_rotation", "rotation_gap", "arap_hessian"))
 def test_neither_nan_nor_infinity_is_met(name, debugging):
     function = FUNCTIONS[name]
     jax.block_until_ready(function(MATRICES))
@@ -68,9 +56,7 @@ def test_an_infinite_singular_value_does_not_reach_what_is_finite(debugging):
         FUNCTIONS["signed_singular_values"](overflowing)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name == "nearest_rotation" else [EXHAUSTIVE]) for name in FUNCTIONS]
-)
+@pytest.mark.parametrize("name", mostly_exhaustive(FUNCTIONS, "nearest_rotation"))
 def test_nothing_is_divided_by_zero(name):
     errors = checkify.div_checks | checkify.nan_checks
     # One operation after the other: compiling with the checks takes minutes.

@@ -7,9 +7,10 @@ import pytest
 from certificate import analytic_jacobian, assert_within, family_batch, in_families, resolved
 from differences import POINTS, assert_is_derivative, central_difference
 from jax.test_util import check_grads
+from marks import mostly_exhaustive
 from parts import decomposition, dense
 
-from jaxrot import METHODS, nearest_quaternion_wxyz, nearest_rotation
+from jaxrot import DEFAULT_METHOD, METHODS, nearest_quaternion_wxyz, nearest_rotation
 from jaxrot.evaluation import reference
 
 RANDOM = np.random.default_rng(0)
@@ -154,13 +155,13 @@ def test_check_grads_agrees(matrix):
     check_grads(jax.jit(nearest_rotation), (matrix,), order=1, modes=["fwd", "rev"], atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", mostly_exhaustive(METHODS, DEFAULT_METHOD, "svd", "gram_schmidt"))
 def test_every_method_has_the_same_derivative_at_a_rotation(method):
     jacobian = jax.jacrev(functools.partial(nearest_rotation, method=method))(np.eye(3))
     np.testing.assert_allclose(np.asarray(jacobian).reshape(9, 9), analytic_jacobian(np.eye(3)), atol=1e-13)
 
 
-@pytest.mark.parametrize("method", ["svd", "davenport"])
+@pytest.mark.parametrize("method", mostly_exhaustive(["svd", "davenport"], "svd"))
 def test_the_second_derivative_is_of_the_rule_and_not_of_the_method(method):
     """At equal singular values the derivative of LAPACK's vectors is NaN, and the rule's is exact."""
     tangent = np.array([[0.3, -0.5, 0.2], [0.7, 0.1, -0.4], [-0.6, 0.2, 0.5]])
@@ -174,13 +175,13 @@ def test_the_second_derivative_is_of_the_rule_and_not_of_the_method(method):
     )
 
 
-@pytest.mark.parametrize("exponent", [-60, 60])
-def test_the_derivative_is_scale_free_bit_for_bit(dtype, exponent):
+def test_the_derivative_is_scale_free_bit_for_bit(dtype):
     matrices = RANDOM.standard_normal((16, 3, 3)).astype(dtype)
     matrices[0] = np.diag([1, 1, -1])
     jacobian = jax.jit(jax.vmap(jax.jacrev(nearest_rotation)))
-    expected = np.ldexp(np.asarray(jacobian(matrices)), -exponent)
-    np.testing.assert_array_equal(np.asarray(jacobian(np.ldexp(matrices, exponent))), expected)
+    for exponent in (-60, 60):
+        expected = np.ldexp(np.asarray(jacobian(matrices)), -exponent)
+        np.testing.assert_array_equal(np.asarray(jacobian(np.ldexp(matrices, exponent))), expected)
 
 
 @pytest.mark.exhaustive
@@ -222,18 +223,18 @@ def test_an_unresolved_axis_does_not_move_and_a_resolved_one_does():
     np.testing.assert_array_equal(jax.jacrev(nearest_rotation)(np.zeros((3, 3))), np.zeros((3, 3, 3, 3)))
 
 
-@pytest.mark.parametrize("start", [np.zeros((3, 3)), np.diag([1.0, 0, 0]), -np.eye(3), np.diag([1.0, 1, -1])])
-def test_gradient_descent_leaves_a_singular_start(start):
+def test_gradient_descent_leaves_a_singular_start():
     """A learned head may begin there: the loss must go down and never be NaN."""
     target = np.asarray(nearest_rotation(POINTS["generic"] + 0.3))
     loss = lambda a: jnp.sum((nearest_rotation(a, damping=1e-2) - target) ** 2)  # noqa: E731
-    gradient = jax.jit(jax.value_and_grad(loss))
-    matrix = start + 1e-3 * np.random.default_rng(1).standard_normal((3, 3))
+    gradient = jax.jit(jax.vmap(jax.value_and_grad(loss)))
+    starts = np.stack([np.zeros((3, 3)), np.diag([1.0, 0, 0]), -np.eye(3), np.diag([1.0, 1, -1])])
+    matrices = starts + 1e-3 * np.random.default_rng(1).standard_normal((3, 3))
     values = []
     for _ in range(300):
-        value, slope = gradient(matrix)
-        values.append(float(value))
+        value, slope = gradient(matrices)
+        values.append(np.asarray(value))
         # The gradient of a function without scale goes like 1/‖A‖.
-        matrix = matrix - 0.02 * np.sum(np.square(matrix)) * slope
+        matrices = matrices - 0.02 * np.sum(np.square(matrices), axis=(1, 2), keepdims=True) * slope
     assert np.isfinite(values).all()
-    assert values[-1] < 0.05 * values[0]
+    assert (values[-1] < 0.05 * values[0]).all()

@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from parts import PARTS
+from marks import mostly_exhaustive
+from parts import PARTS, REFINED
 
 from jaxrot import (
+    DEFAULT_METHOD,
     METHODS,
-    STEPS,
     in_blocks,
     nearest_quaternion_wxyz,
     nearest_rotation,
@@ -22,11 +23,10 @@ from jaxrot import (
 )
 
 A = jnp.eye(3, dtype=jnp.float32)
-LOOPS = ["foam", "squaring", "irving", "higham_newton", "taylor_iterated", "jacobi_svd", "implicit_qr_svd", "torque"]
 FUNCTIONS = {
     **{f"nearest_rotation {method}": functools.partial(nearest_rotation, method=method) for method in METHODS},
     "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
-    **{f"refine_rotation {step}": functools.partial(refine_rotation, rotation=A, step=step) for step in STEPS},
+    **REFINED,
     "refine_rotation unrolled": functools.partial(refine_rotation, rotation=A, derivative="unrolled"),
     "refine_quaternion_wxyz": functools.partial(refine_quaternion_wxyz, quaternion_wxyz=A[0].repeat(4)[:4]),
     **PARTS,
@@ -52,7 +52,11 @@ def compiled_programs(call) -> int:
     return len(compilations) - before
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+IN_SHORT = {f"nearest_rotation {method}" for method in (DEFAULT_METHOD, "irving", "svd")}
+OTHERS = {name for name in FUNCTIONS if not name.startswith("nearest_rotation ")}
+
+
+@pytest.mark.parametrize("name", mostly_exhaustive(FUNCTIONS, *IN_SHORT, *OTHERS))
 def test_a_second_eager_call_compiles_nothing(name):
     function = FUNCTIONS[name]
     function(A)

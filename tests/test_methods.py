@@ -13,6 +13,7 @@ from certificate import (
     resolved,
     within_domain,
 )
+from marks import mostly_exhaustive
 
 from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation
 from jaxrot.families import LARGE_BATCH
@@ -89,9 +90,7 @@ def test_a_declared_limit_is_no_understatement(method, dtype):
         assert_forward_error(on_families(method, dtype), batch, where)
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param(name, marks=[] if name == DEFAULT_METHOD else [EXHAUSTIVE]) for name in METHODS]
-)
+@pytest.mark.parametrize("method", mostly_exhaustive(METHODS, DEFAULT_METHOD))
 def test_a_large_batch_is_the_same_as_a_small_one(method, dtype):
     """On batches above 32,768 jaxlib 0.10.2 returns wrong numbers from some fused reductions (jax#39103)."""
     function = transformed(method, "jit")

@@ -46,20 +46,22 @@ def test_a_start_may_have_any_length(dtype, scales):
     matrices, quaternions = RANDOM.standard_normal((5, 3, 3)).astype(dtype), RANDOM.standard_normal((5, 4))
     quaternions = np.concatenate([quaternions[:4], [[0, 1, 0, 0]]]).astype(dtype)
     start = np.asarray(refine_quaternion_wxyz(matrices, quaternions, iterations=0))
-    expected = np.asarray(refine_quaternion_wxyz(matrices, quaternions))
+    expected = np.asarray(refine_quaternion_wxyz(matrices, quaternions, step="torque"))
     eps = np.finfo(dtype).eps
     for scale in scales:
         for sign in (1, -1):
             scaled = quaternions * np.asarray(sign * scale, dtype)
             kept = refine_quaternion_wxyz(matrices, scaled, iterations=0)
             np.testing.assert_allclose(kept, sign * start, atol=4 * eps)
-            np.testing.assert_allclose(refine_quaternion_wxyz(matrices, scaled), sign * expected, atol=1e3 * eps)
+            np.testing.assert_allclose(
+                refine_quaternion_wxyz(matrices, scaled, step="torque"), sign * expected, atol=1e3 * eps
+            )
     turns = rotations(5).astype(dtype)
-    rotation = np.asarray(refine_rotation(matrices, turns))
+    rotation = np.asarray(refine_rotation(matrices, turns, step="torque"))
     for scale in scales:
         scaled = turns * np.asarray(scale, dtype)
         np.testing.assert_allclose(refine_rotation(matrices, scaled, iterations=0), turns, atol=16 * eps)
-        np.testing.assert_allclose(refine_rotation(matrices, scaled), rotation, atol=1e3 * eps)
+        np.testing.assert_allclose(refine_rotation(matrices, scaled, step="torque"), rotation, atol=1e3 * eps)
 
 
 def test_a_start_without_direction_is_the_identity():
@@ -92,19 +94,9 @@ def test_more_iterations_are_the_same_as_repeated_calls_and_none_return_the_star
 
 
 @pytest.mark.parametrize("step", STEPS)
-def test_what_the_matrix_does_not_determine_is_kept_from_the_start(step):
+def test_the_matrix_of_zeros_keeps_the_start(step):
     start = rotations(6)
     np.testing.assert_allclose(refine_rotation(np.zeros((3, 3)), start, step=step), start, atol=2e-15)
-    # Rank 1: r1 turns to a1 in the plane of the two, and nothing else turns.
-    a1 = np.array([0.0, 0, 2])
-    refined = np.asarray(refine_rotation(np.outer(a1, [1, 0, 0]), start, step=step, iterations=200))
-    # The root that `quest` needs is double at rank 1 and has half the digits.
-    tolerance = 64 * np.finfo(float).eps ** 0.5 if step == "quest" else 1e-12
-    np.testing.assert_allclose(refined[:, :, 0], np.broadcast_to([0, 0, 1], (6, 3)), atol=1e-12)
-    for before, after in zip(start, refined, strict=True):
-        axis = np.cross(before[:, 0], [0, 0, 1])
-        angle = np.arctan2(np.linalg.norm(axis), before[2, 0])
-        np.testing.assert_allclose(after, turned(axis, angle) @ before, atol=tolerance)
 
 
 @pytest.mark.parametrize("step", STEPS)

@@ -29,11 +29,7 @@ def by_differences(function, matrix, start, h=1e-6):
     ("step", "escape"),
     [
         ("torque", False),
-        ("newton", False),
-        *(
-            pytest.param(step, step == "torque", marks=pytest.mark.exhaustive)
-            for step in sorted(set(STEPS) - {"newton"})
-        ),
+        *(pytest.param(step, step == "torque", marks=pytest.mark.exhaustive) for step in STEPS),
     ],
 )
 def test_the_unrolled_derivative_is_that_of_the_iterations_that_were_run(step, escape):
@@ -116,7 +112,6 @@ def test_the_unrolled_quaternion_has_the_derivative_of_the_rotation():
         return refine_rotation(a, rotation(q), derivative="unrolled")
 
     expected = jax.jit(jax.jacfwd(through_rotation, argnums=(0, 1)))(matrix, start)
-    for got, wanted in zip(
-        jax.jit(jax.jacfwd(through_quaternion, argnums=(0, 1)))(matrix, start), expected, strict=True
-    ):
+    found = jax.jit(jax.jacfwd(through_quaternion, argnums=(0, 1)))(matrix, start)
+    for got, wanted in zip(found, expected, strict=True):
         np.testing.assert_allclose(got, wanted, atol=1e-13)

@@ -64,12 +64,10 @@ def test_an_import_is_interrupted_in_one_line(module, words, tmp_path):
 
 
 def test_importing_jaxrot_elsewhere_leaves_ctrl_c_alone(tmp_path):
-    (tmp_path / "other.py").write_text(
-        "import jaxrot, signal; print(signal.getsignal(2) is signal.default_int_handler)"
-    )
-    assert _in_a_process(tmp_path, ["-m", "other", "jaxrot"]).stdout == "True\n"
-    words = ["-c", "import jaxrot, signal; print(signal.getsignal(2) is signal.default_int_handler)", "-m", "jaxrot"]
-    assert _in_a_process(tmp_path, words).stdout == "True\n"
+    program = "import jaxrot, signal; print(signal.getsignal(2) is signal.default_int_handler)"
+    (tmp_path / "other.py").write_text(program)
+    for words in (["-m", "other", "jaxrot"], ["-c", program, "-m", "jaxrot"]):
+        assert _in_a_process(tmp_path, words).stdout == "True\n"
 
 
 def test_a_compilation_is_interrupted_in_one_line(tmp_path):

@@ -21,6 +21,7 @@ from jaxrot.simulate import command as simulate
 from jaxrot.simulate.catalogue import Entry
 
 NOTHING = "interrupted, nothing written\n"
+FILES = ["animation.gif", "health.csv", "health.png", "run.json"]
 
 
 def _interrupted(*arguments, **options):
@@ -89,7 +90,7 @@ def test_the_steps_before_an_interruption_are_drawn_and_written(falling, monkeyp
         yield lambda step: signal.raise_signal(signal.SIGINT) if step == "step 2 of 3" else None
 
     monkeypatch.setattr(simulate, "progress", progress)
-    assert falling() == (130, ["animation.gif", "health.csv", "health.png", "run.json"])
+    assert falling() == (130, FILES)
     assert "Interrupted after 2 of 3 steps" in capsys.readouterr().out
     assert json.loads(pathlib.Path("out/run.json").read_text())["steps"] == 2
 
@@ -107,30 +108,22 @@ def test_an_interruption_while_drawing_costs_no_result(picture, finished, fallin
     assert json.loads(pathlib.Path("out/run.json").read_text())["steps"] == 3
 
 
-def test_the_first_frame_may_be_interrupted(falling, monkeypatch, capsys):
+def test_the_first_frame_may_be_interrupted(falling, monkeypatch):
     # The writer of the animation then raises an error of its own: it has no frame to write.
     monkeypatch.setattr(animation, "_points", lambda axes, count: _interrupted)
     assert falling() == (130, ["health.csv", "health.png", "run.json"])
 
 
-def test_writing_is_not_interrupted(falling, monkeypatch, capsys):
+@pytest.mark.parametrize("presses", [1, 2])
+def test_writing_is_not_interrupted_until_a_second_ctrl_c(presses, falling, monkeypatch, capsys):
     def write(folder, files):
         signal.raise_signal(signal.SIGINT)
-        write_files(folder, files)
+        (write_files if presses == 1 else _interrupted)(folder, files)
 
     write_files = simulate.write_files
     monkeypatch.setattr(simulate, "write_files", write)
-    assert falling() == (0, ["animation.gif", "health.csv", "health.png", "run.json"])
-
-
-def test_a_second_ctrl_c_gives_up(falling, monkeypatch, capsys):
-    def write(folder, files):
-        signal.raise_signal(signal.SIGINT)
-        _interrupted()
-
-    monkeypatch.setattr(simulate, "write_files", write)
-    assert falling() == (130, None)
-    assert capsys.readouterr().err == f"python -m jaxrot simulate: {NOTHING}"
+    assert falling() == ((0, FILES) if presses == 1 else (130, None))
+    assert capsys.readouterr().err == ("" if presses == 1 else f"python -m jaxrot simulate: {NOTHING}")
 
 
 def test_a_long_stretch_between_two_frames_is_interrupted(monkeypatch):

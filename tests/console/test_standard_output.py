@@ -57,12 +57,13 @@ def unread():
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_full_disk_is_said_in_one_line(name, full, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "stdout", full)
-    assert status(COMMANDS[name].split()) == 2
-    text = capsys.readouterr().err
-    assert "standard output cannot be written to (no space left on device)" in text
-    assert text.count("\n") == 1
+def test_a_closed_standard_output_and_a_full_disk_are_said_in_one_line(name, full, monkeypatch, capsys):
+    for stream, words in ((None, "is closed"), (full, "cannot be written to (no space left on device)")):
+        monkeypatch.setattr(sys, "stdout", stream)
+        assert status(COMMANDS[name].split()) == 2
+        text = capsys.readouterr().err
+        assert f"standard output {words}" in text
+        assert text.count("\n") == 1
     assert ("the results are in out" in text) == os.path.exists("out") == ("--out" in COMMANDS[name])
 
 
@@ -72,15 +73,6 @@ def test_a_pipe_that_nobody_reads_ends_the_command_quietly(name, unread, monkeyp
     assert status(COMMANDS[name].split()) == 141
     assert capsys.readouterr().err == ""
     assert os.path.exists("out") == ("--out" in COMMANDS[name])
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_closed_standard_output_is_said_in_one_line(name, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "stdout", None)
-    assert status(COMMANDS[name].split()) == 2
-    text = capsys.readouterr().err
-    assert "standard output is closed" in text
-    assert text.count("\n") == 1
 
 
 @pytest.mark.parametrize("words", ["recommend own.npy", "recommend none.npy --tolerance 1", "simulate nowhere"])

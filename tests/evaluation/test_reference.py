@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from jaxrot.evaluation import reference
+from jaxrot.evaluation import gradient_reference, reference
 from jaxrot.evaluation.reference import EPS
 from jaxrot.families import FAMILIES, with_non_finite
 
@@ -146,3 +146,27 @@ def test_a_reference_at_hand_changes_nothing():
     for measure in MEASURES:
         np.testing.assert_array_equal(measure(wrong, matrices), measure(wrong, matrices, reference=solved))
         assert (measure(wrong, matrices) != 0).all()
+
+
+def test_the_pullback_is_the_slope_of_the_rotation():
+    random = np.random.default_rng(0)
+    matrices, bar, direction = random.standard_normal((3, 50, 3, 3))
+    h = 1e-6
+    ahead, behind = (reference.reference_rotation(matrices + sign * h * direction) for sign in (1, -1))
+    slope = np.sum(bar * (ahead - behind), axis=(1, 2)) / (2 * h)
+    expected = np.sum(gradient_reference.pullback(matrices, bar) * direction, axis=(1, 2))
+    gap = reference.signed_singular_values(matrices)[:, 1:].sum(axis=1)
+    assert np.all(np.abs(slope - expected) * gap**3 < 1e-9 * (1 + np.abs(expected)))
+
+
+def test_the_pullback_scales_with_the_inverse_of_the_matrix():
+    random = np.random.default_rng(0)
+    matrices, bar = random.standard_normal((2, 20, 3, 3))
+    small = gradient_reference.pullback(2.0**-100 * matrices, bar)
+    np.testing.assert_array_equal(small, np.longdouble(2.0) ** 100 * gradient_reference.pullback(matrices, bar))
+
+
+def test_where_the_rotation_is_not_unique_the_pullback_is_no_number():
+    matrices = np.stack([np.diag([1.0, 0, 0]), np.full((3, 3), np.nan), np.eye(3)])
+    bar = np.random.default_rng(0).standard_normal((3, 3, 3))
+    assert np.isfinite(gradient_reference.pullback(matrices, bar)).all(axis=(1, 2)).tolist() == [False, False, True]

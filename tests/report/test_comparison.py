@@ -55,12 +55,8 @@ def test_only_what_stands_apart_is_called_slower(tmp_path):
     now = results([("foam", 150), ("svd", 1050), ("taylor", 50), ("cayley", 30), *REST], right)
     comparison = compare("old.json", before, now, SETS)
     said = verdicts(comparison.times)
-    assert {method: said[method] for method, _ in FOUR} == {
-        "foam": "slower",
-        "svd": "",
-        "taylor": "",
-        "cayley": "faster",
-    }
+    expected = {"foam": "slower", "svd": "", "taylor": "", "cayley": "faster"}
+    assert {method: said[method] for method, _ in FOUR} == expected
     assert "slower: foam (float32, batch 100: 1.50); faster: 1; less accurate: none" in compared_sentence(comparison)
     first = times_compared_table(comparison).rows[0]
     assert (first[0], first[5], first[-1]) == ("foam", "1.5", "**slower**")
@@ -69,9 +65,8 @@ def test_only_what_stands_apart_is_called_slower(tmp_path):
 def test_what_differs_as_much_as_all_the_others_do_is_not_called_slower(tmp_path):
     right = [(method, 1e-7) for method, _ in REST]
     before = written(results(REST, right), tmp_path)
-    now = [
-        (method, median * ratio) for (method, median), ratio in zip(REST, (0.7, 0.85, 1, 1.1, 1.2, 1.4), strict=True)
-    ]
+    ratios = (0.7, 0.85, 1, 1.1, 1.2, 1.4)
+    now = [(method, median * ratio) for (method, median), ratio in zip(REST, ratios, strict=True)]
     comparison = compare("old.json", before, results(now, right), SETS)
     assert set(verdicts(comparison.times).values()) == {""}
 
@@ -82,6 +77,8 @@ def test_a_slower_machine_makes_nobody_slower(tmp_path):
     comparison = compare("old.json", before, now, SETS)
     assert comparison.machine == pytest.approx(1.5)
     assert set(verdicts(comparison.times).values()) == {""}
+    data = ReportData(GIVEN, ("float32",), now, comparison=comparison)
+    assert json.loads(as_json(data))["comparison"]["times"][0]["method"] == "foam"
 
 
 @pytest.mark.parametrize(
@@ -109,9 +106,8 @@ def test_matrices_of_the_families_count_where_both_runs_drew_as_many(tmp_path):
     now = results(FOUR, [*RIGHT, ("foam", 1e-7, 3, "rank_1", "families")])
     (change,) = [change for change in compare("old.json", before, now, SETS).errors if change.method == "foam"]
     assert (change.outside_before, change.outside_now, change.verdict) == (1, 3, "worse")
-    larger = now._replace(
-        accuracy=[entry._replace(matrices=10 if entry.group == "input" else 99) for entry in now.accuracy]
-    )
+    others = [entry._replace(matrices=10 if entry.group == "input" else 99) for entry in now.accuracy]
+    larger = now._replace(accuracy=others)
     (change,) = [change for change in compare("old.json", before, larger, SETS).errors if change.method == "foam"]
     assert (change.outside_before, change.outside_now, change.verdict) == (0, 0, "")
 
@@ -124,9 +120,12 @@ def test_one_method_alone_is_compared_without_the_machines_share(tmp_path):
     assert "Too few times" in compared_sentence(comparison)
 
 
-def test_what_was_not_compared_is_not_praised(tmp_path):
-    before = written(results([("foam", 100)], RIGHT[:1]), tmp_path)
-    words = compared_sentence(compare("old.json", before, results([("svd", 100)], [("svd", 1e-7)]), {"own": 11}))
+def test_nothing_in_common_is_said_and_not_praised(tmp_path):
+    before, now = written(results([("foam", 100)], RIGHT[:1]), tmp_path), results([("svd", 100)], [("svd", 1e-7)])
+    comparison = compare("old.json", before, now, SETS)
+    assert "No method was timed in both runs" in comparison.remarks[0]
+    assert comparison.times == comparison.errors == ()
+    words = compared_sentence(compare("old.json", before, now, {"own": 11}))
     assert "nothing to compare" in words
     assert "none" not in words
 
@@ -136,17 +135,3 @@ def test_errors_on_another_input_are_not_compared(tmp_path):
     comparison = compare("old.json", before, results(FOUR, RIGHT), {"own": 11})
     assert comparison.errors == ()
     assert "another input" in comparison.remarks[0]
-
-
-def test_nothing_in_common_is_said(tmp_path):
-    before = written(results([("foam", 100)], RIGHT[:1]), tmp_path)
-    comparison = compare("old.json", before, results([("svd", 100)], [("svd", 1e-7)]), SETS)
-    assert "No method was timed in both runs" in comparison.remarks[0]
-    assert comparison.times == comparison.errors == ()
-
-
-def test_a_comparison_is_json_too(tmp_path):
-    before = written(results(FOUR, RIGHT), tmp_path)
-    comparison = compare("old.json", before, results(FOUR, RIGHT), SETS)
-    data = ReportData(GIVEN, ("float32",), results(FOUR, RIGHT), comparison=comparison)
-    assert json.loads(as_json(data))["comparison"]["times"][0]["method"] == "foam"

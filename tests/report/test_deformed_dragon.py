@@ -39,9 +39,8 @@ def test_every_stage_is_what_its_name_says(matrices):
 
 def test_twisting_and_bending_keep_lengths_where_they_should(vertices):
     twisted = deformed_dragon.twisted(vertices, 6.0)
-    np.testing.assert_allclose(
-        np.hypot(twisted[:, 0], twisted[:, 2]), np.hypot(vertices[:, 0], vertices[:, 2]), rtol=1e-12
-    )
+    radius, expected = (np.hypot(points[:, 0], points[:, 2]) for points in (twisted, vertices))
+    np.testing.assert_allclose(radius, expected, rtol=1e-12)
     np.testing.assert_array_equal(twisted[:, 1], vertices[:, 1])
     nearly_straight = deformed_dragon.bent(vertices, 1e-6)
     np.testing.assert_allclose(nearly_straight, vertices, atol=1e-5)

@@ -91,10 +91,8 @@ def test_a_peer_is_beyond_the_front_where_no_method_is_as_accurate_and_as_fast(t
 
 
 def test_gradients_have_a_front_of_their_own():
-    contenders = [
-        contender(DEFAULT, 100, 1e-7, is_own=True, gradient=1e-3),
-        contender("peer", 500, 1e-6, gradient=1e-6),
-    ]
+    own = contender(DEFAULT, 100, 1e-7, is_own=True, gradient=1e-3)
+    contenders = [own, contender("peer", 500, 1e-6, gradient=1e-6)]
     assert beyond_front(contenders, of_gradients=False) == []
     assert [entry.name for entry in beyond_front(contenders, of_gradients=True)] == ["peer"]
 

@@ -78,12 +78,6 @@ def test_another_dtype_is_refused_with_what_to_do(array, dtype, code, tmp_path):
     assert code in text
 
 
-def test_objects_are_refused_with_what_to_do(tmp_path):
-    np.save(tmp_path / "own.npy", MATRICES.astype(object), allow_pickle=True)
-    with pytest.raises(UserError, match=r"dtype object.* save array.astype\(numpy.float64\)"):
-        read_input(tmp_path / "own.npy")
-
-
 def test_objects_in_an_archive_are_left_out(tmp_path):
     np.savez(tmp_path / "own.npz", names=np.array([{}], dtype=object), own=MATRICES)
     read = read_input(tmp_path / "own.npz")

@@ -21,25 +21,18 @@ def names(points):
     return [entry.name for entry in points]
 
 
-def test_the_front_is_what_nothing_beats():
-    points = [point("slow", 100, 1e-7), point("beaten", 90, 1e-5), point("middle", 50, 1e-6), point("fast", 10, 1e-2)]
-    assert names(pareto_front(points)) == ["fast", "middle", "slow"]
-
-
-def test_equal_error_and_slower_is_beaten():
-    assert names(pareto_front([point("slower", 20, 1e-6), point("faster", 10, 1e-6)])) == ["faster"]
-
-
-def test_equal_time_and_worse_is_beaten():
-    assert names(pareto_front([point("worse", 10, 1e-3), point("better", 10, 1e-6)])) == ["better"]
-
-
-def test_twins_are_both_on_the_front():
-    assert names(pareto_front([point("one", 10, 1e-6), point("other", 10, 1e-6)])) == ["one", "other"]
-
-
-def test_no_point_no_front():
-    assert pareto_front([]) == []
+@pytest.mark.parametrize(
+    ("points", "front"),
+    [
+        ([("slow", 100, 1e-7), ("beaten", 90, 1e-5), ("middle", 50, 1e-6), ("fast", 10, 1e-2)], "fast middle slow"),
+        ([("slower", 20, 1e-6), ("faster", 10, 1e-6)], "faster"),
+        ([("worse", 10, 1e-3), ("better", 10, 1e-6)], "better"),
+        ([("one", 10, 1e-6), ("twin", 10, 1e-6)], "one twin"),
+        ([], ""),
+    ],
+)
+def test_the_front_is_what_nothing_beats(points, front):
+    assert names(pareto_front([point(*each) for each in points])) == front.split()
 
 
 def test_the_front_agrees_with_its_definition_on_random_points():
@@ -77,7 +70,6 @@ def test_labels_overlap_neither_each_other_nor_a_point(count):
     canvas.draw()
     place_labels(axes, [(f"method_name_{k}", *place) for k, place in enumerate(places.tolist())])
     canvas.draw()
-    boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
     # An annotation's extent holds its leader line, too: ask for the words alone.
     boxes = [type(text).__mro__[1].get_window_extent(text, canvas.get_renderer()) for text in axes.texts]
     assert len(boxes) == count
@@ -89,19 +81,15 @@ def test_labels_overlap_neither_each_other_nor_a_point(count):
 
 
 def test_a_peer_does_not_move_the_front(monkeypatch):
-    fronts = []
-    monkeypatch.setattr(Axes, "plot", spied(Axes.plot, fronts))
-    own, peer = point("own", 20, 1e-6), point("peer", 10, 1e-7)._replace(kind=PEER)
-    draw_pareto([Panel("float32", 1000, [own, peer])], "title")
-    assert [list(times) for times, _ in fronts] == [[20]]
-
-
-def spied(plot, fronts):
-    """`Axes.plot` that also notes what is drawn as steps, which the front alone is."""
+    fronts, plot = [], Axes.plot
 
     def plot_and_note(axes, x, y, *arguments, **options):
+        # The front alone is drawn as steps.
         if options.get("drawstyle") == "steps-post":
-            fronts.append((x, y))
+            fronts.append(list(x))
         return plot(axes, x, y, *arguments, **options)
 
-    return plot_and_note
+    monkeypatch.setattr(Axes, "plot", plot_and_note)
+    own, peer = point("own", 20, 1e-6), point("peer", 10, 1e-7)._replace(kind=PEER)
+    draw_pareto([Panel("float32", 1000, [own, peer])], "title")
+    assert fronts == [[20]]

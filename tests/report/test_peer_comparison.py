@@ -114,9 +114,8 @@ def test_the_tables_name_everybody(measured):
 
 
 def test_a_peer_beyond_the_front_is_said(measured):
-    better = of(measured, "right")._replace(
-        name="better", error=of(measured, "right").error._replace(percentile_99=0.0)
-    )
+    right = of(measured, "right")
+    better = right._replace(name="better", error=right.error._replace(percentile_99=0.0))
     assert any("better in float32 is beyond" in words for words in verdicts([*measured.contenders, better]))
 
 
@@ -143,10 +142,8 @@ def test_every_peer_that_is_here_finds_the_nearest_rotation(name):
 
 def test_a_peer_that_takes_nothing_has_no_time():
     inverted = -np.eye(3) * np.ones((5, 1, 1))
-    judged = {
-        "input": judge({"own": inverted}, "float64", whole=WHOLE),
-        "families": judge({"easy": inverted}, "float64"),
-    }
+    own = judge({"own": inverted}, "float64", whole=WHOLE)
+    judged = {"input": own, "families": judge({"easy": inverted}, "float64")}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(peer_comparison, "PEERS", {"SciPy from_matrix": peers.PEERS["SciPy from_matrix"]})
         measured = compare_with_peers([], judged, batch=2, budget_s=0.0)

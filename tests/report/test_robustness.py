@@ -53,11 +53,8 @@ def test_every_family_is_in_one_case():
 def test_grades_outside_the_contract(orthogonality, lost_trace, expected, dtype):
     eps = float(np.finfo(dtype).eps)
     trace = None if lost_trace is None else lost_trace / eps
-    assert grade(accuracy(outside=1, orthogonality=orthogonality / eps, lost_trace=trace, dtype=dtype)) == expected
-
-
-def test_within_the_contract_is_kept_whatever_else():
     assert grade(accuracy(outside=0, lost_trace=None)) == Grade.KEPT
+    assert grade(accuracy(outside=1, orthogonality=orthogonality / eps, lost_trace=trace, dtype=dtype)) == expected
 
 
 def test_who_survives_everything_is_named_once():
@@ -88,7 +85,7 @@ def test_few_survivors_are_named_and_the_usable_apart():
     assert rank_one["usable, float32"] == "all"
 
 
-def test_dtypes_stand_side_by_side_and_cases_follow_their_order():
+def test_dtypes_stand_side_by_side_cases_follow_their_order_and_words_do_not_break_a_markdown_table():
     entries = [
         accuracy(name, family, dtype=dtype)
         for dtype in ("float32", "float64")
@@ -96,17 +93,9 @@ def test_dtypes_stand_side_by_side_and_cases_follow_their_order():
         for name in NAMES
     ]
     table = robustness_table(entries)
-    assert [row[:2] for row in table.rows] == [
-        ["singular", "`zero`"],
-        ["", "`rank_one`"],
-        ["scale", "`subnormal`"],
-    ]
-    assert table.header[4:] == [
-        f"{what}, {dtype}" for dtype in ("float32", "float64") for what in ("keep the contract", "usable")
-    ]
-
-
-def test_the_words_do_not_break_a_markdown_table():
+    assert [row[:2] for row in table.rows] == [["singular", "`zero`"], ["", "`rank_one`"], ["scale", "`subnormal`"]]
+    columns = ("keep the contract", "usable")
+    assert table.header[4:] == [f"{what}, {dtype}" for dtype in ("float32", "float64") for what in columns]
     entries = [accuracy(name, family) for family in FAMILIES for name in NAMES]
     assert not [word for row in robustness_table(entries).rows for word in row if "|" in word or "\n" in word]
 

@@ -59,16 +59,12 @@ def test_the_grid_is_the_region_with_its_lines_and_corners():
         assert {(t, t), (t, -t), (t, 0.0), (1.0, t), (1.0, -t)} <= points
 
 
-def test_every_cell_has_its_singular_values(dtype):
+def test_every_cell_has_its_singular_values_and_some_matrices_to_the_last_bit(dtype):
     matrices, found = matrices_given(dtype)
     wanted = np.stack([np.ones_like(found.s2), found.s2, found.s3], -1)
     values = reference.signed_singular_values(matrices)
     assert np.abs(values - wanted[:, None]).max() < 4 * np.finfo(dtype).eps
     assert matrices.dtype == dtype
-
-
-def test_some_matrices_have_them_to_the_last_bit(dtype):
-    matrices, found = matrices_given(dtype)
     exact = -np.sort(-np.abs(matrices[:, -4:].reshape(-1, 4, 9)), axis=-1)
     np.testing.assert_array_equal(exact[..., 1], np.repeat(found.s2[:, None], 4, 1))
     np.testing.assert_array_equal(exact[..., 2], np.repeat(np.abs(found.s3)[:, None], 4, 1))
@@ -99,9 +95,8 @@ def test_a_planted_fault_is_in_its_cell_and_nowhere_else(change, kind, dtype):
 def turned(eps_times):
     """A turn by a small angle, in eps of float32, about no principal axis of any matrix."""
     angle = eps_times * np.finfo("float32").eps / 3**0.5
-    return lambda rotation: (rotation + rotation @ (angle * np.array([[0, -1, 1], [1, 0, -1], [-1, 1, 0]]))).astype(
-        "float32"
-    )
+    cross = angle * np.array([[0, -1, 1], [1, 0, -1], [-1, 1, 0]])
+    return lambda rotation: (rotation + rotation @ cross).astype("float32")
 
 
 def test_a_small_error_is_shown_in_its_units():
@@ -161,9 +156,8 @@ def test_an_absolute_epsilon_is_found_on_the_scale(dtype, end):
 
 def test_the_signs_of_the_determinant_are_told_apart():
     def upright_only(name, matrices):
-        return good(name, matrices) * np.sign(reference.signed_singular_values(matrices)[:, 2]).astype("float32")[
-            :, None, None
-        ]  # fmt: skip
+        signs = np.sign(reference.signed_singular_values(matrices)[:, 2]).astype("float32")
+        return good(name, matrices) * signs[:, None, None]
 
     found = map_scales(["upright_only"], upright_only, "float32", exponents=(-2, -1, 0, 1))
     summary = summarise_scales(found)["upright_only"]

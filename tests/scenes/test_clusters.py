@@ -25,7 +25,7 @@ def test_the_dragon_ships_with_its_acknowledgement(vertices):
     assert "acknowledged" in text
 
 
-def test_clusters_cover_the_dragon_and_overlap(vertices):
+def test_clusters_of_nearest_vertices_cover_the_dragon_and_overlap(vertices):
     clusters = overlapping_clusters(vertices, 400, SIZE)
     assert clusters.shape == (400, SIZE)
     assert all(len(set(row)) == SIZE for row in clusters.tolist())
@@ -33,26 +33,20 @@ def test_clusters_cover_the_dragon_and_overlap(vertices):
     covered = len(np.unique(clusters))
     assert covered > 0.9 * len(vertices)
     assert clusters.size > 2 * covered
-
-
-def test_a_cluster_holds_the_nearest_vertices(vertices):
-    row = overlapping_clusters(vertices, 5, SIZE)[4]
+    row = clusters[4]
     distance = np.linalg.norm(vertices - vertices[row[0]], axis=1)
     assert np.max(distance[row]) <= np.min(np.delete(distance, row))
 
 
-def test_covering_clusters_hold_every_vertex():
+def test_covering_clusters_hold_every_vertex_and_spread_ones_hold_it_once():
     points = np.random.default_rng(0).standard_normal((300, 3)) ** 3
     assert len(np.unique(overlapping_clusters(points, 30, 20))) < 300
     clusters = covering_clusters(points, 30, 20)
     assert set(clusters.ravel().tolist()) == set(range(300))
     np.testing.assert_array_equal(clusters[:30], overlapping_clusters(points, 30, 20))
-
-
-def test_spread_clusters_hold_every_vertex_once():
-    clusters = spread_clusters(100, 32)
-    assert sorted(np.concatenate(clusters).tolist()) == list(range(100))
-    assert {len(cluster) for cluster in clusters} == {25}
+    spread = spread_clusters(100, 32)
+    assert sorted(np.concatenate(spread).tolist()) == list(range(100))
+    assert {len(cluster) for cluster in spread} == {25}
 
 
 def test_incidence_is_the_table_of_clusters_the_other_way_round():

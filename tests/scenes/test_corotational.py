@@ -83,16 +83,9 @@ def test_a_rigid_motion_makes_no_ghost_force():
 def test_a_cantilever_bends_as_euler_and_bernoulli_say():
     length, load = 8.0, 1e-3
     mesh = box((96, 1, 8), (length, 0.125, 1.0))
-    state, parameters = build(
-        *mesh,
-        young=1e7,
-        poisson=0.0,
-        density=1.0,
-        time_step=STATIC,
-        gravity=(0, 0, -load),
-        fixed=mesh.vertices[:, 0] == 0,
-        dtype="float64",
-    )
+    material = {"young": 1e7, "poisson": 0.0, "density": 1.0, "gravity": (0, 0, -load)}
+    fixed = mesh.vertices[:, 0] == 0
+    state, parameters = build(*mesh, **material, time_step=STATIC, fixed=fixed, dtype="float64")
     bent = rollout(1, conjugate_gradients=10_000, tolerance=1e-5)(state, parameters)[0]
     deflection = np.mean((state.positions - bent.positions)[mesh.vertices[:, 0] == length, 2])
     assert deflection / (load * length**4 / (8 * 1e7 / 12)) == pytest.approx(1, abs=0.03)
@@ -187,11 +180,8 @@ def test_a_rollout_is_differentiable_and_finds_the_stiffness_of_a_final_shape():
 
     def final_shape(compliance):
         shear_modulus, lame_first = elasticity.lame_parameters(1e6 / compliance, 0.3)
-        count = (len(mesh.tetrahedra),)
-        stiffness = {
-            "shear_modulus": jnp.broadcast_to(shear_modulus, count),
-            "lame_first": jnp.broadcast_to(lame_first, count),
-        }
+        stiffness = {"shear_modulus": shear_modulus, "lame_first": lame_first}
+        stiffness = {name: jnp.broadcast_to(value, (len(mesh.tetrahedra),)) for name, value in stiffness.items()}
         other = parameters._replace(elements=parameters.elements._replace(**stiffness))
         return rollout(8, rotation="torque_exact_angle", tolerance=1e-10)(state, other)[0].positions
 
@@ -227,3 +217,48 @@ def test_static_choices_leave_out_what_they_switch_off():
     held = flops(lambda d: elasticity.held_tangent(gradients, parameters.elements)(d), gradients)
     exact = flops(lambda d: elasticity.exact_tangent(gradients, gradients, parameters.elements)(d), gradients)
     assert held < exact
+
+
+@functools.cache
+def random_elements():
+    """A few hundred deformation gradients, a third of them inverted, and all that is computed at them."""
+    _, parameters = build(*BLOCK, young=1.0, poisson=0.3, dtype="float64")
+    elements = parameters.elements
+    rng = np.random.default_rng(0)
+    gradients = jnp.asarray(rng.normal(size=(len(BLOCK.tetrahedra), 3, 3)))
+    directions = jnp.broadcast_to(jnp.eye(9).reshape(9, 1, 3, 3), (9, *gradients.shape))
+
+    def rotations_of(gradients):
+        return refine_rotation(gradients, jnp.eye(3), step="newton", iterations=16)
+
+    def computed(gradients):
+        def energy(gradients):
+            return elasticity.energy(gradients, rotations_of(gradients), elements)
+
+        rotations = rotations_of(gradients)
+        stress = elasticity.stress(gradients, rotations, elements)
+        exact = jax.vmap(elasticity.exact_tangent(gradients, rotations, elements))(directions)
+        projected = jax.vmap(elasticity.projected_tangent(gradients, rotations, elements))(directions)
+        held = jax.vmap(elasticity.held_tangent(rotations, elements))(directions)
+        return stress, jax.grad(energy)(gradients), exact, projected, held
+
+    stress, of_energy, *tangents = jax.jit(computed)(gradients)
+    dense = [np.asarray(tangent).reshape(9, -1, 9).swapaxes(0, 1) for tangent in tangents]
+    return np.asarray(stress), np.asarray(of_energy) / np.asarray(elements.volumes)[:, None, None], *dense
+
+
+@pytest.mark.exhaustive
+def test_the_force_with_rotations_held_is_the_derivative_of_the_energy():
+    stress, of_energy, *_ = random_elements()
+    np.testing.assert_allclose(stress, of_energy, atol=1e-9 * np.abs(stress).max())
+
+
+@pytest.mark.exhaustive
+def test_the_projected_tangent_is_the_exact_one_without_its_negative_eigenvalues():
+    _, _, exact, projected, held = random_elements()
+    np.testing.assert_allclose(exact, exact.swapaxes(1, 2), atol=1e-8 * np.abs(exact).max())
+    values, vectors = np.linalg.eigh(0.5 * (exact + exact.swapaxes(1, 2)))
+    clipped = (vectors * np.maximum(values, 0)[:, None]) @ vectors.swapaxes(1, 2)
+    assert (values < -0.1).any()
+    np.testing.assert_allclose(projected, clipped, atol=1e-8 * values.max())
+    assert np.linalg.eigvalsh(held).min() > -1e-12

@@ -90,9 +90,7 @@ def test_gram_schmidt_drifts_from_a_steady_body_in_proportion_to_the_steps(bodie
 def test_between_repairs_the_product_is_that_without_repair(bodies):
     start, parameters = bodies
     steps = 999
-    rare, without = (
-        _advance(repair, every)(start, parameters, steps) for repair, every in (("taylor", 1000), (None, 1))
-    )
+    rare, without = (_advance(*choice)(start, parameters, steps) for choice in (("taylor", 1000), (None, 1)))
     np.testing.assert_array_equal(rare.rotation, without.rotation)
     repaired = _advance("taylor", 1000)(rare, parameters, 1)
     assert np.max(_measure(repaired, parameters)[1]) < 3 * EPS

@@ -35,39 +35,35 @@ def test_a_scene_runs_on_a_mesh_of_the_users(name):
     assert values["elastic energy (J)"] < 1e-3 * first["elastic energy (J)"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"young": -1.0}, "young must be finite and > 0"),
-        ({"young": float("nan")}, "young must be finite and > 0"),
-        ({"density": 0.0}, "density must be finite and > 0"),
-        ({"time_step": -0.1}, "time_step must be finite and > 0"),
-        ({"poisson": 0.5}, "poisson must be above -1 and below 1/2"),
-        ({"poisson": -1.0}, "poisson must be above"),
-        ({"damping": -1.0}, "damping must be finite and >= 0"),
-        ({"gravity": (0, 0)}, "gravity must be three finite numbers"),
-        ({"fixed": np.zeros(3, bool)}, "fixed must be bool of shape"),
-    ],
-)
-def test_a_bad_parameter_is_refused_in_one_line(arguments, message):
-    with pytest.raises(ValueError, match=message) as refusal:
-        build(*SMALL, **{"young": 1e5, **arguments})
-    assert "\n" not in str(refusal.value)
+def built(**arguments):
+    return build(*SMALL, **{"young": 1e5, **arguments})
+
+
+def stepped(**choices):
+    return corotational.step(*built(), **choices)
 
 
 @pytest.mark.parametrize(
-    ("choices", "message"),
+    ("call", "arguments", "message"),
     [
-        ({"rotation": "nearest"}, "rotation must be a step, one of cayley"),
-        ({"rotation": "newton", "iterations": None}, "rotation must be a method, one of cayley"),
-        ({"tangent": "secant"}, "tangent must be one of exact, held, projected"),
-        ({"tangent": "exact", "iterations": 0}, "tangent must be 'held' where iterations is 0"),
-        ({"integrator": "explicit"}, "integrator must be one of euler, midpoint"),
-        ({"newton_iterations": 0}, "must be >= 1"),
+        (built, {"young": -1.0}, "young must be finite and > 0"),
+        (built, {"young": float("nan")}, "young must be finite and > 0"),
+        (built, {"density": 0.0}, "density must be finite and > 0"),
+        (built, {"time_step": -0.1}, "time_step must be finite and > 0"),
+        (built, {"poisson": 0.5}, "poisson must be above -1 and below 1/2"),
+        (built, {"poisson": -1.0}, "poisson must be above"),
+        (built, {"damping": -1.0}, "damping must be finite and >= 0"),
+        (built, {"gravity": (0, 0)}, "gravity must be three finite numbers"),
+        (built, {"fixed": np.zeros(3, bool)}, "fixed must be bool of shape"),
+        (stepped, {"rotation": "nearest"}, "rotation must be a step, one of cayley"),
+        (stepped, {"rotation": "newton", "iterations": None}, "rotation must be a method, one of cayley"),
+        (stepped, {"tangent": "secant"}, "tangent must be one of exact, held, projected"),
+        (stepped, {"tangent": "exact", "iterations": 0}, "tangent must be 'held' where iterations is 0"),
+        (stepped, {"integrator": "explicit"}, "integrator must be one of euler, midpoint"),
+        (stepped, {"newton_iterations": 0}, "must be >= 1"),
     ],
 )
-def test_an_unknown_choice_is_refused_in_one_line(choices, message):
-    state, parameters = build(*SMALL, young=1e5)
+def test_a_bad_parameter_or_choice_is_refused_in_one_line(call, arguments, message):
     with pytest.raises(ValueError, match=message) as refusal:
-        corotational.step(state, parameters, **choices)
+        call(**arguments)
     assert "\n" not in str(refusal.value)

@@ -1,8 +1,9 @@
-"""The closed forms of Sarabandi et al. 2020 and their roots: `inverse_square_root`, `smith_franca`, `horn_quartic`."""
+"""Sarabandi et al. 2020: closed forms, their roots, and what to make of the four columns of eq. (27)."""
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from differences import quaternion_rotations
 
 from jaxrot import nearest_rotation
 from jaxrot._algebra import mat3, quaternion
@@ -56,26 +57,56 @@ def test_the_largest_root_of_the_quartic_is_the_sum_of_the_signed_singular_value
 def test_the_dominant_eigenvalue_must_be_the_algebraically_largest():
     """Sarabandi et al. 2020 say "maximal absolute value" after eq. (27), which fails for many inverted matrices."""
     matrices = gaussian(-1)
-    n = np.stack(
-        [np.stack(column, -1) for column in quaternion.davenport_columns(mat3.components(jnp.asarray(matrices)), 0.0)],
-        -1,
-    )
+    columns = quaternion.davenport_columns(mat3.components(jnp.asarray(matrices)), 0.0)
+    n = np.stack([np.stack(column, -1) for column in columns], -1)
     values, vectors = np.linalg.eigh(n)
     in_modulus = np.take_along_axis(vectors, np.abs(values).argmax(-1)[:, None, None], -1)[..., 0]
     rotation = mat3.stack(quaternion.to_rotation(quaternion.components(jnp.asarray(in_modulus))))
     assert (reference.forward_error(np.asarray(rotation), matrices) > 0.1).mean() > 0.1
-    assert (
-        np.median(reference.forward_error(np.asarray(nearest_rotation(matrices, method="horn_quartic")), matrices))
-        < 1e-13
-    )
+    solved = np.asarray(nearest_rotation(matrices, method="horn_quartic"))
+    assert np.median(reference.forward_error(solved, matrices)) < 1e-13
 
 
 def test_the_adjugate_of_a_symmetric_matrix_times_it_is_its_determinant():
     random = np.random.default_rng(0).standard_normal((50, 4, 4))
     symmetric = random + random.transpose(0, 2, 1)
-    columns = quaternion.adjugate(
-        tuple(quaternion.components(jnp.asarray(symmetric[:, :, j])) for j in range(4))  # pyright: ignore
-    )
-    adjugate = np.stack([np.stack(column, -1) for column in columns], -1)
+    columns = tuple(quaternion.components(jnp.asarray(symmetric[:, :, j])) for j in range(4))
+    adjugate = np.stack([np.stack(column, -1) for column in quaternion.adjugate(columns)], -1)
     expected = np.linalg.det(symmetric)[:, None, None] * np.eye(4)
     np.testing.assert_allclose(symmetric @ adjugate, expected, atol=1e-11)
+
+
+def test_the_average_is_best_in_the_worst_case_and_shepperd_and_markley_worst_in_the_mean():
+    """Their figure 4. In the mean the average and Cayley cross over, at δ = 0.3 once the scale is removed."""
+    noisy = FAMILIES["noisy_rotation_0.5"].sample(10_000, dtype=np.float64).matrices
+    errors = {
+        name: np.linalg.norm(np.asarray(nearest_rotation(noisy, method=name)) - noisy, axis=(1, 2))
+        for name in ("quaternion_average", "cayley", "shepperd_markley")
+    }
+    mean = [error.mean() for error in errors.values()]
+    assert mean == sorted(mean)
+    assert errors["quaternion_average"].max() < 0.8 * errors["cayley"].max()
+
+
+def test_the_simple_average_fails_where_the_components_add_up_to_zero():
+    # q ∝ (1, −1, 1, −1): the four columns cancel.
+    cancelling = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    assert np.linalg.det(cancelling) == 1
+    random = np.random.default_rng(0)
+    noisy = cancelling + random.uniform(-0.05, 0.05, (200, 3, 3))
+    errors = {
+        name: reference.forward_error(np.asarray(nearest_rotation(noisy, method=name)), noisy)
+        for name in ("simple_average", "quaternion_average")
+    }
+    assert errors["quaternion_average"].max() < 0.2
+    assert np.median(errors["simple_average"]) > 0.2
+    assert np.isnan(nearest_rotation(cancelling, method="simple_average")).all()
+    np.testing.assert_allclose(nearest_rotation(cancelling, method="quaternion_average"), cancelling, atol=1e-15)
+
+
+def test_the_simple_average_is_no_worse_where_all_components_are_positive():
+    """The flaw is the signs alone."""
+    rotation = quaternion_rotations(np.random.default_rng(0).uniform(0.5, 1, (4, 200)))
+    noisy = rotation + np.random.default_rng(1).uniform(-0.01, 0.01, rotation.shape)
+    solved = [np.asarray(nearest_rotation(noisy, method=name)) for name in ("simple_average", "quaternion_average")]
+    np.testing.assert_allclose(solved[0], solved[1], atol=1e-15)
