@@ -1,5 +1,8 @@
 """Commands that measure nothing, and what they say when they refuse."""
 
+import os
+import pathlib
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -10,6 +13,10 @@ from jaxrot.report.inputs import Input
 from jaxrot.report.measure.results import Results
 from jaxrot.report.show import document, records
 from jaxrot.scenes.scene import Scene
+
+# Compiled programs are kept; this suite's other settings are not those of who pastes an example.
+CACHED = os.environ | {"JAX_COMPILATION_CACHE_DIR": str(pathlib.Path(__file__).parent.parent / ".jax_cache")}
+CACHED |= {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1"}
 
 
 def status(words):

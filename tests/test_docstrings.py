@@ -1,13 +1,13 @@
 """Public docstrings have the same sections in one order, are short, and their examples run."""
 
 import inspect
-import os
 import pathlib
 import re
 import subprocess
 import sys
 
 import pytest
+from commands import CACHED
 
 import jaxrot
 from jaxrot import families
@@ -61,13 +61,9 @@ def problems(docstring: str, *, is_function: bool) -> list[str]:
 
 
 def run_examples(modules: set[str], directory: pathlib.Path) -> subprocess.CompletedProcess:
-    """Runs the examples in an interpreter of their own: this suite's compilation cache, but not its settings."""
-    cache = {
-        "JAX_COMPILATION_CACHE_DIR": str(ROOT / ".jax_cache"),
-        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1",
-    }
+    """Runs the examples in an interpreter of their own."""
     command = [sys.executable, "-c", RUN_EXAMPLES, *sorted(modules)]
-    return subprocess.run(command, cwd=directory, env=os.environ | cache, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=directory, env=CACHED, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(("name", "value"), public_objects().items(), ids=public_objects())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxrot.evaluation import reference
-from jaxrot.families import FAMILIES, LARGE_BATCH, Family, half_turn_starts, with_non_finite
+from jaxrot.families import FAMILIES, Family, half_turn_starts, with_non_finite
 
 COUNT = 96
 NAMES = """zero identity minus_identity reflection half_turn swap signed_permutation small_integers gaussian rotation
@@ -79,11 +79,6 @@ def test_other_dtypes_are_refused():
     for dtype in (np.float16, np.int32, np.complex64):
         with pytest.raises(TypeError, match="dtype must be float32 or float64"):
             FAMILIES["gaussian"].sample(1, dtype)
-
-
-def test_a_large_batch_is_large():
-    assert LARGE_BATCH > 32_768
-    assert FAMILIES["noisy_rotation_0.1"].sample(LARGE_BATCH).matrices.shape == (LARGE_BATCH, 3, 3)
 
 
 def test_the_explicit_matrices_are_what_they_are_called(dtype):

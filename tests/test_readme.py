@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from commands import CACHED
 
 from jaxrot import METHODS, STEPS
 from jaxrot.simulate.catalogue import SCENES
@@ -28,7 +29,8 @@ PAGES = {
 def test_the_code_of_a_page_does_what_it_says(page, examples):
     assert len(doctest.DocTestParser().get_examples((ROOT / page).read_text())) >= examples
     # In an interpreter of its own: as a newcomer pastes it, without this suite's settings.
-    run = subprocess.run([sys.executable, "-m", "doctest", page], cwd=ROOT, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "doctest", page]
+    run = subprocess.run(command, cwd=ROOT, env=CACHED, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout
 
 

@@ -78,7 +78,7 @@ def admitted(matrices):
     return {name for name, method in METHODS.items() if outside_domain(method, sample) is None}
 
 
-def test_noisy_rotations_are_spared_what_they_do_not_need(on_noise):
+def test_noisy_rotations_are_spared_what_they_do_not_need_and_inverted_matrices_are_not(on_noise, on_inverted):
     assert (on_noise.meets, on_noise.name, on_noise.method, on_noise.step) == (True, "taylor", "taylor", None)
     assert not METHODS[on_noise.method].handles_inversion
     assert 0 < on_noise.error <= 1e-2 / on_noise.margin
@@ -88,9 +88,6 @@ def test_noisy_rotations_are_spared_what_they_do_not_need(on_noise):
     dearer = {each.name: each.time_ns for each in on_noise.runners_up}
     assert dearer[DEFAULT_METHOD] > on_noise.time_ns
     assert f"The default, {DEFAULT_METHOD}, takes 52 ns" in on_noise.statement
-
-
-def test_inverted_matrices_are_not(on_inverted):
     assert on_inverted.meets
     assert on_inverted.name == DEFAULT_METHOD
     assert "det A < 0" in on_inverted.excluded["taylor"]
@@ -206,11 +203,8 @@ def test_with_previous_rotations_a_step_and_few_iterations_are_recommended(warm,
     assert DEFAULT_METHOD in names
     rotation = jax.jit(warm.apply)(*frames)
     assert reference.forward_error(np.asarray(rotation), frames[0]).max() <= 1e-2
-
-
-def test_a_step_gets_the_smallest_number_of_iterations(warm, frames):
-    found = {each.step: each for each in warm.runners_up if each.step}
-    linear = found["torque_exact_angle"]
+    # The smallest number of iterations.
+    linear = {each.step: each for each in warm.runners_up if each.step}["torque_exact_angle"]
     assert linear.iterations > 1
     fewer = jaxrot.refine_rotation(*frames, step=linear.step, iterations=linear.iterations - 1)
     assert reference.forward_error(np.asarray(fewer), frames[0]).max() > 1e-2 / warm.margin >= linear.error

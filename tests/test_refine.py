@@ -46,22 +46,20 @@ def test_a_start_may_have_any_length(dtype, scales):
     matrices, quaternions = RANDOM.standard_normal((5, 3, 3)).astype(dtype), RANDOM.standard_normal((5, 4))
     quaternions = np.concatenate([quaternions[:4], [[0, 1, 0, 0]]]).astype(dtype)
     start = np.asarray(refine_quaternion_wxyz(matrices, quaternions, iterations=0))
-    expected = np.asarray(refine_quaternion_wxyz(matrices, quaternions, step="torque"))
+    expected = np.asarray(refine_quaternion_wxyz(matrices, quaternions))
     eps = np.finfo(dtype).eps
     for scale in scales:
         for sign in (1, -1):
             scaled = quaternions * np.asarray(sign * scale, dtype)
             kept = refine_quaternion_wxyz(matrices, scaled, iterations=0)
             np.testing.assert_allclose(kept, sign * start, atol=4 * eps)
-            np.testing.assert_allclose(
-                refine_quaternion_wxyz(matrices, scaled, step="torque"), sign * expected, atol=1e3 * eps
-            )
+            np.testing.assert_allclose(refine_quaternion_wxyz(matrices, scaled), sign * expected, atol=1e3 * eps)
     turns = rotations(5).astype(dtype)
-    rotation = np.asarray(refine_rotation(matrices, turns, step="torque"))
+    rotation = np.asarray(refine_rotation(matrices, turns))
     for scale in scales:
         scaled = turns * np.asarray(scale, dtype)
         np.testing.assert_allclose(refine_rotation(matrices, scaled, iterations=0), turns, atol=16 * eps)
-        np.testing.assert_allclose(refine_rotation(matrices, scaled, step="torque"), rotation, atol=1e3 * eps)
+        np.testing.assert_allclose(refine_rotation(matrices, scaled), rotation, atol=1e3 * eps)
 
 
 def test_a_start_without_direction_is_the_identity():

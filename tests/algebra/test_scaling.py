@@ -15,10 +15,7 @@ def test_the_factor_is_the_power_of_two_that_leads_into_two_to_four(dtype):
     assert ((product >= 2) & (product < 4)).all()
     assert (np.frexp(factor)[0] == 0.5).all()
     assert (factor >= info.tiny).all()
-
-
-def test_the_factor_of_what_has_none_is_the_largest_or_zero(dtype):
-    info = np.finfo(dtype)
+    # What has none.
     special = np.array([0, info.smallest_subnormal, np.inf, np.nan], dtype)
     largest = 2.0 ** (info.maxexp - 1)
     np.testing.assert_array_equal(scaling.power_of_two_factor(special), np.array([largest, largest, 0, 0], dtype))

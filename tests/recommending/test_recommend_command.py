@@ -44,14 +44,6 @@ def test_it_prints_the_choice_and_the_rest(tmp_path, inverted, capsys):
     assert max(map(len, shown.out.splitlines())) <= 100
 
 
-def test_a_tolerance_that_nothing_meets_is_said_so(tmp_path, inverted, capsys):
-    words = ["recommend", tmp_path / "inverted.npy", "--tolerance", "1e-20", "--dtype", "float64"]
-    assert main([str(word) for word in words]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert out.startswith("Nothing meets the tolerance 1.0e-20 on 20 matrices in float64")
-    assert f"{DEFAULT_METHOD} comes nearest" in out
-
-
 def test_previous_rotations_are_read_by_name(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(recommend_module, "STEPS", {"newton": jaxrot.STEPS["newton"]})
     monkeypatch.setattr(candidates, "time_methods", _steps_first)

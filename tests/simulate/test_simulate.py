@@ -48,8 +48,7 @@ def test_a_recording_has_every_frame_from_the_first_state_on():
     assert list(recording.health) == ["speed (m/s)", "height (m)", "a share"]
     assert recording.steps == 4
 
-
-def test_steps_that_no_stretch_divides_are_all_made():
+    # Steps that no stretch divides.
     recording = record(falling(), 3, 2, SILENT)
     np.testing.assert_allclose(recording.times, [0, 0.2, 0.3])
     np.testing.assert_allclose(recording.health["height (m)"], [2, 1, 0.5])
@@ -84,7 +83,6 @@ def test_a_run_writes_its_files_and_prints_its_health(only_falling, tmp_path, ca
         (["dragon", "--mesh", "none.ply"], "--mesh none.ply: "),
         (["drift", "--out", "file"], "--out file: this is a file"),
         (["dragon", "--mesh", "empty.obj"], "--mesh empty.obj: "),
-        (["dragon", "--mesh", "spoiled.obj"], "vertices must be finite; vertex 1 is"),
         (["recovery", "--mesh", "surface.obj"], "no tetrahedra"),
         (["dragon", "--mesh", "file"], "--mesh file: "),
     ],
@@ -94,7 +92,6 @@ def test_a_mistake_gets_one_line_and_status_2(words, message, tmp_path, capsys, 
     (tmp_path / "file").write_text("")
     (tmp_path / "empty.obj").write_text("# nothing\n")
     (tmp_path / "surface.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n")
-    (tmp_path / "spoiled.obj").write_text("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n")
     before = sorted(tmp_path.iterdir())
     assert message in refused(["simulate", *words], capsys)
     assert sorted(tmp_path.iterdir()) == before

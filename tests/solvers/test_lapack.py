@@ -6,6 +6,7 @@ import sys
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import CACHED
 
 from jaxrot import METHODS
 from jaxrot._nearest import solved
@@ -41,4 +42,4 @@ for method in ("svd", "davenport"):
     for function in (jaxrot.nearest_rotation, jax.jacrev(jaxrot.nearest_rotation)):
         assert jnp.isnan(function(matrix, method=method)).all()
 """
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", program], env=CACHED, check=True, timeout=120)

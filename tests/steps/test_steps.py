@@ -115,6 +115,14 @@ def test_newton_reaches_the_contract_from_anywhere(limit, dtype):
     assert posed.outside(repeat("newton", posed.matrices, left, 16)) == 0
 
 
+def test_quest_is_exact_in_one_step_and_cayley_reaches_the_contract_from_45_degrees(dtype):
+    posed = problem(dtype, 10)
+    assert posed.outside(repeat("quest", posed.matrices, posed.near, 1)) < 0.01
+    # Half a turn off there is a second step to do.
+    assert posed.outside(repeat("quest", posed.matrices, posed.anywhere, 2)) < 0.01
+    assert posed.outside(repeat("cayley", posed.matrices, posed.near, 5)) == 0
+
+
 def test_saddles_repel_newton(dtype):
     """A hundredth off a half turn about each principal axis: Newton's own axis leads straight back to it."""
     posed = problem(dtype, 10)
@@ -131,18 +139,6 @@ def test_newton_passes_a_quarter_turn_about_the_weakest_axis(dtype):
     axes = np.asarray(posed.axes, float)
     start = np.asarray(posed.nearest, float) @ axes @ quarter @ axes.swapaxes(1, 2)
     assert posed.outside(repeat("newton", posed.matrices, start.astype(dtype), 8)) < 0.002
-
-
-def test_quest_is_exact_in_one_step(dtype):
-    """From 45°; half a turn off there is a second step to do."""
-    posed = problem(dtype, 10)
-    assert posed.outside(repeat("quest", posed.matrices, posed.near, 1)) < 0.01
-    assert posed.outside(repeat("quest", posed.matrices, posed.anywhere, 2)) < 0.01
-
-
-def test_cayley_reaches_the_contract_from_45_degrees(dtype):
-    posed = problem(dtype, 10)
-    assert posed.outside(repeat("cayley", posed.matrices, posed.near, 5)) == 0
 
 
 @pytest.mark.parametrize("step", STEPS)
