@@ -1,6 +1,7 @@
-"""Matrices at which derivatives are checked, and central differences to check them with."""
+"""Matrices at which derivatives are checked, rotations to make others of, and central differences."""
 
 import numpy as np
+import pytest
 
 from jaxrot.families import FAMILIES
 
@@ -13,6 +14,9 @@ POINTS = {
 }
 # Where singular vectors have a derivative too.
 DISTINCT = {name: POINTS[name] for name in ("rank two", "inverted", "generic")}
+at_points, at_distinct_points = (
+    pytest.mark.parametrize("matrix", points.values(), ids=points.keys()) for points in (POINTS, DISTINCT)
+)
 
 
 def turned(axis, angle):

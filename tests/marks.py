@@ -3,6 +3,7 @@
 import pytest
 
 
-def mostly_exhaustive(names, *default):
-    """All of the names, marked `exhaustive` but for the default ones."""
-    return [name if name in default else pytest.param(name, marks=pytest.mark.exhaustive) for name in names]
+def mostly_exhaustive(cases, *default):
+    """All of the cases, each a value or a tuple, marked `exhaustive` but for the default ones."""
+    values = {case: case if isinstance(case, tuple) else (case,) for case in cases}
+    return [pytest.param(*values[x], marks=[] if x in default else pytest.mark.exhaustive) for x in values]

@@ -73,13 +73,8 @@ def run(program, **environment):
 @pytest.mark.exhaustive
 @pytest.mark.skipif(importlib.util.find_spec("libtpu") is None, reason="libtpu is not installed")
 def test_a_tpu_reads_and_writes_few_bytes_a_matrix():
-    printed = run(
-        TPU,
-        TPU_SKIP_MDS_QUERY="1",
-        TPU_ACCELERATOR_TYPE="v5litepod-1",
-        TPU_WORKER_HOSTNAMES="localhost",
-        ALLOW_MULTIPLE_LIBTPU_LOAD="1",
-    )
+    alone = {"TPU_SKIP_MDS_QUERY": "1", "TPU_WORKER_HOSTNAMES": "localhost", "ALLOW_MULTIPLE_LIBTPU_LOAD": "1"}
+    printed = run(TPU, TPU_ACCELERATOR_TYPE="v5litepod-1", **alone)
     accessed = json.loads(printed.splitlines()[-1])
     assert accessed["value"] < 900
     assert accessed["pullback"] < 1600

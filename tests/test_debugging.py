@@ -1,5 +1,3 @@
-"""JAX's checks report nothing on legal input."""
-
 import jax
 import jax.numpy as jnp
 import numpy as np

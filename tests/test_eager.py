@@ -11,24 +11,16 @@ import pytest
 from marks import mostly_exhaustive
 from parts import PARTS, REFINED
 
-from jaxrot import (
-    DEFAULT_METHOD,
-    METHODS,
-    in_blocks,
-    nearest_quaternion_wxyz,
-    nearest_rotation,
-    refine_quaternion_wxyz,
-    refine_rotation,
-    rotation_jacobian,
-)
+import jaxrot
+from jaxrot import DEFAULT_METHOD, METHODS, in_blocks, nearest_rotation, refine_rotation, rotation_jacobian
 
 A = jnp.eye(3, dtype=jnp.float32)
 FUNCTIONS = {
     **{f"nearest_rotation {method}": functools.partial(nearest_rotation, method=method) for method in METHODS},
-    "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
+    "nearest_quaternion_wxyz": jaxrot.nearest_quaternion_wxyz,
     **REFINED,
     "refine_rotation unrolled": functools.partial(refine_rotation, rotation=A, derivative="unrolled"),
-    "refine_quaternion_wxyz": functools.partial(refine_quaternion_wxyz, quaternion_wxyz=A[0].repeat(4)[:4]),
+    "refine_quaternion_wxyz": functools.partial(jaxrot.refine_quaternion_wxyz, quaternion_wxyz=A[0].repeat(4)[:4]),
     **PARTS,
     # Each call makes the function in blocks anew, as a user's loop does.
     "in_blocks": lambda a: in_blocks(nearest_gram_schmidt, 2)(np.broadcast_to(a, (5, 3, 3))),
@@ -79,18 +71,15 @@ def test_numpy_and_python_numbers_are_the_same_option(function):
     assert compiled_programs(lambda: refine_rotation(A, A, iterations=np.int64(2))) == 0
 
 
-def test_gradients_without_jit_are_compiled_once_too():
-    gradient = jax.grad(lambda a: nearest_rotation(a, method="gram_schmidt")[0, 1])
-    gradient(A)
-    assert compiled_programs(lambda: gradient(A)) == 0
-
-
-def test_blocks_trace_their_function_once_for_a_shape():
+def test_blocks_trace_their_function_once_for_a_shape_and_gradients_without_jit_compile_once():
     chex.clear_trace_counter()
     # Once for its result's type, once in the loop and once for the rest.
     blocks = in_blocks(chex.assert_max_traces(lambda a: nearest_gram_schmidt(a), n=3), 4)
     for _ in range(3):
         blocks(jnp.broadcast_to(A, (9, 3, 3)))
+    gradient = jax.grad(lambda a: nearest_rotation(a, method="gram_schmidt")[0, 1])
+    gradient(A)
+    assert compiled_programs(lambda: gradient(A)) == 0
 
 
 @pytest.mark.parametrize("name", ["nearest_rotation irving", "refine_rotation torque", "in_blocks"])

@@ -67,10 +67,14 @@ def test_a_dtype_that_is_not_real_is_refused(function, dtype):
 
 
 @all_gates
-def test_what_is_no_array_is_refused(function):
+def test_what_is_no_array_or_long_double_is_refused_in_words(function):
     for argument in (None, "rotation", {"a": 1}):
         with pytest.raises(TypeError, match="matrix must be a real array"):
             function(argument)
+    with pytest.raises(
+        TypeError, match=r"got dtype (float128|longdouble): convert it by matrix\.astype\(numpy\.float64"
+    ):
+        function(A.astype(np.longdouble))
 
 
 @all_conversions
@@ -96,14 +100,6 @@ def test_big_endian_arrays_are_converted(dtype):
     np.testing.assert_array_equal(CHEAP["nearest_rotation"](big), CHEAP["nearest_rotation"](native))
     refine = functools.partial(refine_rotation, native, step="torque")
     np.testing.assert_array_equal(refine(np.eye(3).astype(dtype)), refine(np.eye(3)))
-
-
-@all_gates
-def test_long_double_is_refused_with_the_line_that_converts_it(function):
-    with pytest.raises(
-        TypeError, match=r"got dtype (float128|longdouble): convert it by matrix\.astype\(numpy\.float64"
-    ):
-        function(A.astype(np.longdouble))
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (2, 0), (1,), (2, 1, 3)])

@@ -57,7 +57,7 @@ def imported_rooms(path: pathlib.Path) -> set[str]:
     return {name if name in LEVEL else "__init__" for name in rooms} - {room(path)}
 
 
-def test_imports_point_one_way():
+def test_imports_point_one_way_and_files_stay_under_250_lines():
     upwards = {
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in FILES
@@ -65,9 +65,10 @@ def test_imports_point_one_way():
         if LEVEL[name] > LEVEL[room(path)]
     }
     assert not upwards
+    assert not {str(path.relative_to(PACKAGE)) for path in FILES if len(path.read_text().splitlines()) >= 250}
 
 
-def test_the_core_imports_jax_and_numpy_alone():
+def test_the_core_imports_jax_and_numpy_alone_and_nothing_that_measures():
     allowed = {"jax", "jaxlib", "numpy", "jaxrot"} | STANDARD
     foreign = {
         f"{path.relative_to(PACKAGE)} imports {name}"
@@ -77,13 +78,6 @@ def test_the_core_imports_jax_and_numpy_alone():
         if name.split(".")[0] not in allowed | (OF_STARTUP if room(path) == "_startup" else set())
     }
     assert not foreign
-
-
-def test_files_stay_under_250_lines():
-    assert not {str(path.relative_to(PACKAGE)) for path in FILES if len(path.read_text().splitlines()) >= 250}
-
-
-def test_importing_jaxrot_loads_nothing_that_measures():
     program = "import sys, jaxrot; print([name for name in sys.modules if name.startswith('jaxrot.')])"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert "jaxrot._nearest" in run.stdout

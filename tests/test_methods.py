@@ -1,25 +1,18 @@
 """Method × dtype × family × transform, against the certificate."""
 
 import functools
+import itertools
 
 import jax
 import numpy as np
 import pytest
-from certificate import (
-    assert_contract,
-    assert_forward_error,
-    family_batch,
-    in_families,
-    resolved,
-    within_domain,
-)
+from certificate import assert_contract, assert_forward_error, family_batch, in_families, resolved, within_domain
 from marks import mostly_exhaustive
 
 from jaxrot import DEFAULT_METHOD, METHODS, nearest_rotation
 from jaxrot.families import LARGE_BATCH
 
 LAPACK = {"svd", "davenport"}  # their errors are those of the library that jaxlib was built with
-EXHAUSTIVE = pytest.mark.exhaustive
 
 
 @functools.lru_cache
@@ -38,14 +31,11 @@ def on_families(method, dtype):
     return np.asarray(transformed(method, "jit")(family_batch(dtype).matrices))
 
 
-@pytest.mark.parametrize(
-    ("method", "transform"),
-    [
-        pytest.param(name, transform, marks=[] if name == DEFAULT_METHOD or transform == "jit" else [EXHAUSTIVE])
-        for name in METHODS
-        for transform in ("eager", "jit", "vmap", "jit∘vmap")
-    ],
-)
+TRANSFORMED = list(itertools.product(METHODS, ("eager", "jit", "vmap", "jit∘vmap")))
+IN_SHORT = [case for case in TRANSFORMED if case[0] == DEFAULT_METHOD or case[1] == "jit"]
+
+
+@pytest.mark.parametrize(("method", "transform"), mostly_exhaustive(TRANSFORMED, *IN_SHORT))
 def test_a_method_keeps_its_promise_on_every_family(method, dtype, transform):
     batch = family_batch(dtype)
     rotation = np.asarray(transformed(method, transform)(batch.matrices))

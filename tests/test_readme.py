@@ -34,13 +34,6 @@ def test_the_code_of_a_page_does_what_it_says(page, examples):
     assert run.returncode == 0, run.stdout
 
 
-def test_the_readme_has_one_command_for_the_report_and_one_for_the_tests():
-    commands = [line for line in README.splitlines() if line.startswith("python3 -m venv")]
-    assert len(commands) == 2
-    assert sum("python -m jaxrot report" in line for line in commands) == 1
-    assert sum("python -m pytest" in line for line in commands) == 1
-
-
 @pytest.mark.parametrize(("room", "registry"), [("solvers", METHODS), ("steps", STEPS)])
 def test_the_table_of_a_room_names_every_entry_and_its_source(room, registry):
     lines = (ROOT / "jaxrot" / room / "README.md").read_text().splitlines()
@@ -48,9 +41,13 @@ def test_the_table_of_a_room_names_every_entry_and_its_source(room, registry):
         assert any(line.startswith(f"| `{name}`") and entry.source in line for line in lines), name
 
 
-def test_every_scene_has_a_row_in_the_table():
+def test_every_scene_has_a_row_and_the_readme_one_command_for_the_report_and_one_for_the_tests():
     rows = re.findall(r"^\| `(\w+)`", (ROOT / "jaxrot/scenes/README.md").read_text(), re.MULTILINE)
     assert rows == list(SCENES)
+    commands = [line for line in README.splitlines() if line.startswith("python3 -m venv")]
+    assert len(commands) == 2
+    assert sum("python -m jaxrot report" in line for line in commands) == 1
+    assert sum("python -m pytest" in line for line in commands) == 1
 
 
 @pytest.mark.parametrize("page", PAGES)

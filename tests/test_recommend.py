@@ -94,7 +94,7 @@ def test_noisy_rotations_are_spared_what_they_do_not_need_and_inverted_matrices_
     assert {each.name for each in on_inverted.runners_up} == ALWAYS - {DEFAULT_METHOD}
 
 
-def test_every_method_is_in_exactly_one_place(on_noise, on_inverted):
+def test_every_method_is_in_exactly_one_place_and_what_was_left_out_is_counted(on_noise, on_inverted):
     for result, methods in ((on_noise, METHODS.keys() - SLOW_TO_COMPILE), (on_inverted, METHODS)):
         others = [each.name for each in (*result.runners_up, *result.too_inaccurate)]
         assert sorted([result.name, *others, *result.excluded]) == sorted(methods)
@@ -104,9 +104,6 @@ def test_every_method_is_in_exactly_one_place(on_noise, on_inverted):
         for each in result.too_inaccurate:
             assert each.error > result.tolerance / result.margin
             assert np.isnan(each.time_ns)
-
-
-def test_what_was_left_out_and_what_is_not_determined_is_counted(on_inverted):
     assert (on_inverted.given, on_inverted.not_finite, on_inverted.sample) == (203, 2, 201)
     assert on_inverted.undetermined == 1
     assert "2 of 203 matrices left out: NaN or infinity" in on_inverted.statement

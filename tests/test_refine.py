@@ -62,9 +62,13 @@ def test_a_start_may_have_any_length(dtype, scales):
         np.testing.assert_allclose(refine_rotation(matrices, scaled), rotation, atol=1e3 * eps)
 
 
-def test_a_start_without_direction_is_the_identity():
+def test_a_start_without_direction_is_the_identity_and_batches_broadcast():
     np.testing.assert_array_equal(refine_rotation(np.eye(3), np.zeros((3, 3)), iterations=0), np.eye(3))
     np.testing.assert_array_equal(refine_quaternion_wxyz(np.eye(3), np.zeros(4), iterations=0), [1, 0, 0, 0])
+    matrices, start = RANDOM.standard_normal((5, 3, 3)), rotations(2)
+    refined = refine_rotation(matrices[:, None], start, iterations=2)
+    assert refined.shape == (5, 2, 3, 3)
+    np.testing.assert_allclose(refined[3, 1], refine_rotation(matrices[3], start[1], iterations=2), atol=1e-15)
 
 
 @pytest.mark.parametrize("singular_values", [(1, 0.05, 0.02), (1, 0.005, 0.002)])
@@ -137,13 +141,6 @@ def test_the_sign_of_a_quaternion_is_continuous():
         assert following @ quaternion > 0.9
         quaternion = following
     np.testing.assert_allclose(quaternion, [1, 0, 0, 0], atol=1e-3)
-
-
-def test_batches_broadcast():
-    matrices, start = RANDOM.standard_normal((5, 3, 3)), rotations(2)
-    refined = refine_rotation(matrices[:, None], start, iterations=2)
-    assert refined.shape == (5, 2, 3, 3)
-    np.testing.assert_allclose(refined[3, 1], refine_rotation(matrices[3], start[1], iterations=2), atol=1e-15)
 
 
 def test_the_derivative_is_implicit_and_forgets_the_start():

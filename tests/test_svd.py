@@ -4,15 +4,13 @@ import jax
 import numpy as np
 import pytest
 from certificate import assert_rotations, assert_within, family_batch, survives_flushing
-from differences import DISTINCT, POINTS, assert_is_derivative
+from differences import POINTS, assert_is_derivative, at_distinct_points, at_points
 
 from jaxrot import nearest_rotation, rotation_variant_svd, signed_singular_values
 from jaxrot.evaluation import reference
 
-distinct = pytest.mark.parametrize("matrix", DISTINCT.values(), ids=DISTINCT.keys())
 
-
-def test_the_factors_are_rotations_in_order_and_make_the_matrix(dtype):
+def test_the_factors_are_rotations_in_order_and_make_the_matrix_and_the_nearest_rotation(dtype):
     batch = family_batch(dtype)
     eps, tiny = np.finfo(dtype).eps, np.finfo(dtype).tiny
     left, s, right = (np.asarray(x) for x in jax.jit(rotation_variant_svd)(batch.matrices))
@@ -28,14 +26,9 @@ def test_the_factors_are_rotations_in_order_and_make_the_matrix(dtype):
     product = np.einsum("nij,nj,nkj->nik", *(x[normal].astype(np.longdouble) for x in (left, s, right)))
     error = np.sqrt(np.square((product - matrices) / size[:, None, None]).sum((1, 2)))
     assert_within(error, 32 * eps, names, "product of the factors")
-
-
-def test_the_factors_make_the_nearest_rotation(dtype):
-    batch = family_batch(dtype)
     where = batch.condition < 1e3
-    left, _, right = (np.asarray(x) for x in jax.jit(rotation_variant_svd)(batch.matrices))
     difference = np.abs(left @ right.swapaxes(1, 2) - np.asarray(jax.jit(nearest_rotation)(batch.matrices)))
-    assert_within(difference[where].max((1, 2)), 32 * np.finfo(dtype).eps, batch.families[where], "left · rightᵀ")
+    assert_within(difference[where].max((1, 2)), 32 * eps, batch.families[where], "left · rightᵀ")
 
 
 @pytest.mark.exhaustive
@@ -84,7 +77,7 @@ VALUES_FIRST = jax.jit(jax.jacrev(signed_singular_values))
 VALUES_SECOND = jax.jit(jax.jacfwd(jax.jacrev(signed_singular_values)))
 
 
-@distinct
+@at_distinct_points
 @pytest.mark.exhaustive
 def test_the_derivatives_are_right_where_singular_values_differ(matrix):
     assert_is_derivative(lambda a: FIRST_AND_FACTORS(a)[0], lambda a: FIRST_AND_FACTORS(a)[1], matrix)
@@ -92,7 +85,7 @@ def test_the_derivatives_are_right_where_singular_values_differ(matrix):
     assert_is_derivative(VALUES_SECOND, VALUES_FIRST, matrix)
 
 
-@pytest.mark.parametrize("matrix", POINTS.values(), ids=POINTS.keys())
+@at_points
 def test_the_product_of_the_factors_turns_as_the_nearest_rotation_does(matrix):
     """Equal singular values included, where U and V themselves are damped."""
     jacobian, factors = (np.asarray(x) for x in FIRST_AND_FACTORS(matrix))

@@ -1,6 +1,7 @@
 """What callers wrap around jaxrot: control flow, sharding, export, precision settings."""
 
 import functools
+import itertools
 import re
 
 import jax
@@ -12,16 +13,8 @@ from jax.sharding import PartitionSpec as P
 from marks import mostly_exhaustive
 from parts import EYE, PARTS, REFINED, all_parts, decomposition
 
-from jaxrot import (
-    DEFAULT_METHOD,
-    METHODS,
-    STEPS,
-    in_blocks,
-    nearest_quaternion_wxyz,
-    nearest_rotation,
-    refine_quaternion_wxyz,
-    refine_rotation,
-)
+import jaxrot
+from jaxrot import DEFAULT_METHOD, METHODS, STEPS, in_blocks, nearest_quaternion_wxyz, nearest_rotation, refine_rotation
 
 A = np.random.default_rng(0).standard_normal((64, 3, 3)).astype(np.float32)
 LAPACK = ("svd", "davenport")
@@ -41,23 +34,14 @@ FUNCTIONS = {
 }
 METHODS_BY_NAME = {f"nearest_rotation {name}": functools.partial(nearest_rotation, method=name) for name in METHODS}
 SELDOM = {"decomposition", *REFINED.keys() - {"refine_rotation newton"}}
-all_functions = pytest.mark.parametrize(
-    "function",
-    [
-        pytest.param(function, id=name, marks=[pytest.mark.exhaustive] if name in SELDOM else [])
-        for name, function in FUNCTIONS.items()
-    ],
-)
 
 
-@pytest.mark.parametrize(
-    ("name", "axis_type"),
-    [
-        pytest.param(name, axis_type, marks=[pytest.mark.exhaustive] if name in seldom else [])
-        for axis_type, seldom in ((AxisType.Auto, SELDOM), (AxisType.Explicit, FUNCTIONS.keys() - {"nearest_rotation"}))
-        for name in FUNCTIONS
-    ],
-)
+SHARDED = list(itertools.product(FUNCTIONS, (AxisType.Auto, AxisType.Explicit)))
+SHARDED_IN_SHORT = {(name, AxisType.Auto) for name in FUNCTIONS.keys() - SELDOM}
+SHARDED_IN_SHORT.add(("nearest_rotation", AxisType.Explicit))
+
+
+@pytest.mark.parametrize(("name", "axis_type"), mostly_exhaustive(SHARDED, *SHARDED_IN_SHORT))
 def test_a_sharded_batch_needs_no_collectives(name, axis_type):
     function = FUNCTIONS[name]
     mesh = jax.make_mesh((8,), ("batch",), axis_types=(axis_type,))
@@ -73,7 +57,7 @@ def test_a_sharded_batch_needs_no_collectives(name, axis_type):
 MAPPED = {
     **PARTS,
     "nearest_quaternion_wxyz": nearest_quaternion_wxyz,
-    "refine_quaternion_wxyz": lambda a: refine_quaternion_wxyz(a, EYE[0][[0, 1, 2, 2]], escape=True),
+    "refine_quaternion_wxyz": lambda a: jaxrot.refine_quaternion_wxyz(a, EYE[0][[0, 1, 2, 2]], escape=True),
     **METHODS_BY_NAME,
     **{
         f"refine_rotation {step} {derivative}": functools.partial(
@@ -154,8 +138,9 @@ def test_blocks_are_for_the_cpu_alone(platform, monkeypatch):
     assert "while" not in jax.jit(blocked).lower(A).as_text()
 
 
-@all_functions
-def test_it_works_inside_shard_map_and_vmap(function):
+@pytest.mark.parametrize("name", mostly_exhaustive(FUNCTIONS, *FUNCTIONS.keys() - SELDOM))
+def test_it_works_inside_shard_map_and_vmap(name):
+    function = FUNCTIONS[name]
     mesh = jax.make_mesh((8,), ("batch",), axis_types=(AxisType.Auto,))
     mapped = jax.shard_map(jax.vmap(function), mesh=mesh, in_specs=P("batch"), out_specs=P("batch"))
     compiled = jax.jit(mapped).lower(A).compile()

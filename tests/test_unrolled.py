@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from certificate import family_batch
 from differences import POINTS, difference_jacobian, turned
+from marks import mostly_exhaustive
 
 from jaxrot import STEPS, nearest_rotation, refine_quaternion_wxyz, refine_rotation
 from jaxrot._algebra import mat3, quaternion
@@ -25,13 +26,10 @@ def by_differences(function, matrix, start, h=1e-6):
     return difference_jacobian(lambda a: function(a, start), matrix, h), np.stack(by_start, -1)
 
 
-@pytest.mark.parametrize(
-    ("step", "escape"),
-    [
-        ("torque", False),
-        *(pytest.param(step, step == "torque", marks=pytest.mark.exhaustive) for step in STEPS),
-    ],
-)
+CASES = [("torque", False), *((step, step == "torque") for step in STEPS)]
+
+
+@pytest.mark.parametrize(("step", "escape"), mostly_exhaustive(CASES, ("torque", False)))
 def test_the_unrolled_derivative_is_that_of_the_iterations_that_were_run(step, escape):
     """Stopped early, after two iterations; with `escape` from a half turn off, where that does something."""
     matrix = POINTS["generic"]

@@ -146,16 +146,13 @@ def test_a_report_is_written_without_pictures_where_the_drawing_is_interrupted(t
     assert sorted(os.listdir(tmp_path / "out")) == ["report.csv", "report.html", "report.json", "report.md"]
 
 
-def test_a_background_job_is_not_interrupted():
+def test_a_background_job_is_not_interrupted_and_another_thread_may_run_a_command(capsys):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with watched():
             signal.raise_signal(signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def test_another_thread_may_run_a_command(capsys):
     statuses = []
     thread = threading.Thread(target=lambda: statuses.append(main(["simulate", "nowhere"])))
     thread.start()

@@ -25,12 +25,21 @@ def outside(rotation, judged):
     return np.flatnonzero(accuracy.measure_errors(rotation, judged).is_outside).tolist()
 
 
-def test_errors_are_defined_where_the_contract_speaks_of_them(judged, best):
+def test_errors_are_defined_where_the_contract_speaks_of_them_and_counted_in_each_set(judged, best):
     errors = accuracy.measure_errors(best, judged)
     assert not np.isnan(errors.forward[:50]).any()
     assert np.isnan(errors.forward[50:]).all(), "R is not unique, not finite, or lost with the subnormal entries"
     np.testing.assert_array_equal(np.isnan(errors.orthogonality[50:]), [False, False, True, False])
     np.testing.assert_array_equal(np.isnan(errors.torque[50:]), [False, False, True, True])
+    rotation = best.copy()
+    rotation[7] = -rotation[7]
+    method = jaxrot.METHODS[jaxrot.DEFAULT_METHOD]
+    errors = accuracy.measure_errors(rotation, judged)
+    whole, random, special = accuracy.summarise("name", method, errors, judged, "input")
+    assert (whole.matrices, whole.not_finite, whole.judged, whole.outside) == (54, 1, 50, 1)
+    assert (random.matrices, random.outside, random.outside_in_domain) == (50, 1, 1)
+    assert (special.matrices, special.judged, special.forward_max, special.outside) == (4, 0, None, 0)
+    assert whole.in_domain == 54
 
 
 SPOILS = {
@@ -51,18 +60,6 @@ def test_what_is_wrong_and_only_that_is_outside(name, judged, best):
     rotation = best.copy()
     rotation[number] = spoil(rotation[number])
     assert outside(rotation, judged) == [number]
-
-
-def test_the_summary_counts_each_set(judged, best):
-    rotation = best.copy()
-    rotation[7] = -rotation[7]
-    method = jaxrot.METHODS[jaxrot.DEFAULT_METHOD]
-    errors = accuracy.measure_errors(rotation, judged)
-    whole, random, special = accuracy.summarise("name", method, errors, judged, "input")
-    assert (whole.matrices, whole.not_finite, whole.judged, whole.outside) == (54, 1, 50, 1)
-    assert (random.matrices, random.outside, random.outside_in_domain) == (50, 1, 1)
-    assert (special.matrices, special.judged, special.forward_max, special.outside) == (4, 0, None, 0)
-    assert whole.in_domain == 54
 
 
 def test_the_domain_is_what_the_method_declares(judged):

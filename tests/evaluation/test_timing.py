@@ -37,7 +37,12 @@ def test_every_method_runs_once_in_every_round():
     assert repeats == dict.fromkeys("abc", 1)
 
 
-def test_drift_hits_all_methods_alike():
+def test_a_short_call_is_repeated_within_a_sample_and_drift_hits_all_methods_alike():
+    clock = Clock()
+    calls = {"short": clock.function("short", 1e-4), "long": clock.function("long", 1.0)}
+    samples, repeats = interleave(clock, calls, shortest_sample_s=2e-3)
+    assert repeats == {"short": 20, "long": 1}
+    assert samples["short"] == pytest.approx([1e-4] * 8)
     clock = Clock()
     slower_and_slower = lambda: 1.0 + clock.now / 100  # noqa: E731
     samples, _ = interleave(clock, {name: clock.function(name, slower_and_slower) for name in "ab"}, most_rounds=30)
@@ -46,23 +51,12 @@ def test_drift_hits_all_methods_alike():
     assert samples["a"][-1] > 1.5 * samples["a"][0]
 
 
-def test_a_short_call_is_repeated_within_a_sample():
-    clock = Clock()
-    calls = {"short": clock.function("short", 1e-4), "long": clock.function("long", 1.0)}
-    samples, repeats = interleave(clock, calls, shortest_sample_s=2e-3)
-    assert repeats == {"short": 20, "long": 1}
-    assert samples["short"] == pytest.approx([1e-4] * 8)
-
-
-def test_the_budget_ends_the_rounds_but_not_before_the_fewest():
+def test_the_budget_ends_the_rounds_but_not_before_the_fewest_and_the_first_call_is_not_counted():
     clock = Clock()
     samples, _ = interleave(clock, {"a": clock.function("a", 1.0)}, budget_s=4.5, most_rounds=99, fewest_rounds=3)
     assert len(samples["a"]) == 5
     samples, _ = interleave(clock, {"a": clock.function("a", 1.0)}, budget_s=0.0, most_rounds=99, fewest_rounds=3)
     assert len(samples["a"]) == 3
-
-
-def test_the_first_call_is_not_counted():
     clock = Clock()
     cost = iter([1000.0] + [1.0] * 99)
     samples, _ = interleave(clock, {"a": clock.function("a", lambda: next(cost))})

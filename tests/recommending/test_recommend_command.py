@@ -1,5 +1,3 @@
-"""`python -m jaxrot recommend` as its user meets it."""
-
 import jax
 import numpy as np
 import pytest

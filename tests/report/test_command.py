@@ -1,5 +1,3 @@
-"""The command as its user meets it, in this process and on tiny inputs."""
-
 import csv
 import io
 import itertools
@@ -28,7 +26,6 @@ def own_matrices():
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory, own_matrices):
-    """One report on matrices of one's own, two methods, both dtypes."""
     folder = tmp_path_factory.mktemp("report")
     np.save(folder / "own.npy", own_matrices)
     out = folder / "new" / "report"
@@ -49,10 +46,14 @@ def test_the_dragon_is_the_default_input(tmp_path, capsys, monkeypatch):
     assert "`minus_identity`" in text
 
 
-def test_all_files_are_written_and_nothing_else(report):
+def test_all_files_are_written_and_the_page_needs_no_other(report):
     assert {path.name for path in report.iterdir()} == FILES
     assert {path.name for path in report.parent.iterdir()} == {report.name}
     assert imread(report / "pareto.png").ndim == 3
+    page = (report / "report.html").read_text(encoding="utf-8")
+    assert "keeps the contract on all" in page
+    assert page.count("data:image/png;base64,") == 2
+    assert "pareto.png" not in page
 
 
 def test_markdown_opens_with_findings_then_pictures_then_tables(report):
@@ -63,13 +64,6 @@ def test_markdown_opens_with_findings_then_pictures_then_tables(report):
     for word in (jaxrot.__version__, jax.__version__, np.__version__, "float32, float64", "cores usable", "commit"):
         assert word in text[text.index("## Where this was measured") :]
     assert "1 of the 40 matrices of own.npy hold a NaN" in text
-
-
-def test_the_page_says_the_same_and_needs_no_other_file(report):
-    page = (report / "report.html").read_text(encoding="utf-8")
-    assert "keeps the contract on all" in page
-    assert page.count("data:image/png;base64,") == 2
-    assert "pareto.png" not in page
 
 
 def test_a_report_is_compared_with_an_earlier_one(report, own_matrices, tmp_path, capsys):
@@ -84,7 +78,7 @@ def test_a_report_is_compared_with_an_earlier_one(report, own_matrices, tmp_path
     assert "## Against an earlier run" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
 
 
-def test_csv_and_json_agree(report):
+def test_csv_and_json_agree_and_own_matrices_are_counted_without_their_nan(report, own_matrices):
     content = json.loads((report / "report.json").read_text(encoding="utf-8"))
     rows = list(csv.DictReader(io.StringIO((report / "report.csv").read_text(encoding="utf-8"))))
     assert len(rows) == len(content["accuracy"]) == 2 * 2 * (2 + len(jaxrot.families.FAMILIES))
@@ -98,9 +92,6 @@ def test_csv_and_json_agree(report):
         assert float(row[f"median_ns_batch_{entry['batch']}"]) == entry["median_ns"] > 0
     timed = {(entry["dtype"], entry["batch"]) for entry in content["timing"]}
     assert timed == set(itertools.product(("float32", "float64"), (7, 64)))
-
-
-def test_own_matrices_are_counted_and_their_nan_left_out(report, own_matrices):
     content = json.loads((report / "report.json").read_text(encoding="utf-8"))
     entries = {(entry["method"], entry["dtype"]): entry for entry in content["accuracy"] if entry["set_name"] == "own"}
     assert content["input"] == {"name": "own.npy", "sets": {"own": 40}}
@@ -131,14 +122,11 @@ def test_the_configuration_is_left_as_it_was():
     assert [getattr(jax.config, name) for name in names] == before
 
 
-def test_every_fitting_array_of_an_archive_is_a_set(tmp_path):
+def test_every_fitting_array_of_an_archive_is_a_set_and_a_large_file_is_sampled_from_all(tmp_path):
     np.savez(tmp_path / "own.npz", a=np.ones((2, 3, 3), np.float16), b=np.zeros((3, 3), int), other=np.ones(4))
     given = read_input(tmp_path / "own.npz")
     assert {name: part.shape for name, part in given.sets.items()} == {"a": (2, 3, 3), "b": (1, 3, 3)}
     assert "other (shape (4,))" in given.remarks[0]
-
-
-def test_a_large_file_is_sampled_from_every_set_and_says_so():
     sets = {"large": np.arange(900.0)[:, None, None] * np.ones((3, 3)), "small": np.ones((100, 3, 3))}
     sample = thinned(Input("own", sets), 50)
     assert {name: len(part) for name, part in sample.sets.items()} == {"large": 45, "small": 5}

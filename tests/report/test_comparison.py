@@ -120,7 +120,7 @@ def test_one_method_alone_is_compared_without_the_machines_share(tmp_path):
     assert "Too few times" in compared_sentence(comparison)
 
 
-def test_nothing_in_common_is_said_and_not_praised(tmp_path):
+def test_nothing_in_common_is_said_and_not_praised_and_errors_on_another_input_are_not_compared(tmp_path):
     before, now = written(results([("foam", 100)], RIGHT[:1]), tmp_path), results([("svd", 100)], [("svd", 1e-7)])
     comparison = compare("old.json", before, now, SETS)
     assert "No method was timed in both runs" in comparison.remarks[0]
@@ -128,9 +128,6 @@ def test_nothing_in_common_is_said_and_not_praised(tmp_path):
     words = compared_sentence(compare("old.json", before, now, {"own": 11}))
     assert "nothing to compare" in words
     assert "none" not in words
-
-
-def test_errors_on_another_input_are_not_compared(tmp_path):
     before = written(results(FOUR, RIGHT), tmp_path)
     comparison = compare("old.json", before, results(FOUR, RIGHT), {"own": 11})
     assert comparison.errors == ()

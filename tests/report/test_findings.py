@@ -59,13 +59,10 @@ def test_the_fastest_within_the_contract_is_named_and_compared():
     assert "foam (20 ns, outside on 3)" in faster_outside(Results(accuracies, times, ()), "float32")
 
 
-def test_a_difference_within_the_spread_is_none():
+def test_a_difference_within_the_spread_and_nobody_within_the_contract_are_said():
     text = said([accuracy("svd"), accuracy(DEFAULT)], [timing("svd", 110), timing(DEFAULT, 100)])
     assert "within the spread of svd" in text
     assert "faster than" not in text
-
-
-def test_nobody_within_the_contract_is_said():
     text = said([accuracy("svd", 4), accuracy(DEFAULT, 2, 2)], [timing("svd", 110), timing(DEFAULT, 100)])
     assert f"mine (10): none in float32 ({DEFAULT} comes closest, outside on 2)" in text
 

@@ -74,12 +74,9 @@ def test_a_ratio_is_that_of_the_times_it_names(default, step):
     assert step[""].time.ratio == step["renormalisation"].time.ratio == 1
 
 
-def test_quartiles_are_of_the_ratios_in_the_same_round():
+def test_programs_are_timed_side_by_side_and_quartiles_are_of_the_ratios_in_the_same_round():
     time = compare_times(np.array([1.0, 2, 3, 4, 50]), np.array([1.0, 1, 1, 1, 10]))
     assert time == Time(3e9, 1e9, 3, 2, 4)
-
-
-def test_programs_are_timed_side_by_side_for_the_fewest_rounds_at_least():
     slow = jax.jit(lambda a: jnp.sin(jnp.sin(jnp.sin(a))))
     given = jnp.zeros(200_000, jnp.float32)
     seconds = ablation_cost.time_side_by_side({"fast": lambda a: a, "slow": slow}, (given,), 0.0)
@@ -194,7 +191,7 @@ def test_a_difference_is_stated_where_the_quartiles_are_on_one_side(quartiles, w
     assert table.rows[0][1] == words
 
 
-def test_the_table_names_the_worst_families_of_both_dtypes_and_how_far_they_are_off():
+def test_the_table_names_the_steps_the_worst_families_of_both_dtypes_and_how_far_they_are_off():
     many = [Broken(f"family_{i}", 2, 1, 100.0 - i, "trace") for i in range(7)]
     prices = [priced(""), priced("scale", broken=many), priced("", "float64")]
     prices.append(priced("scale", "float64", broken=[Broken("family_6", 1500, 1, float("inf"), "rotation")], gained=3))
@@ -205,9 +202,6 @@ def test_the_table_names_the_worst_families_of_both_dtypes_and_how_far_they_are_
     assert scale[2:6] == ["14 / 1,500", "7 / 1", "0 / 3", "100 trace / ∞ rotation"]
     assert scale[6].startswith("`family_6` ∞, `family_0` 100, `family_1` 99")
     assert scale[6].endswith("`family_4` 96 and 1 more")
-
-
-def test_the_table_of_several_steps_names_them():
     table = guards_table([priced("scale"), priced("scale", of="newton")], "title")
     assert table.header[:2] == ["step", "left out"]
     assert [row[:2] for row in table.rows] == [["torque", "scale"], ["newton", "scale"]]

@@ -34,14 +34,11 @@ def test_the_pictures_are_inside():
     assert image["alt"] == "What is seen"
 
 
-def test_nothing_is_fetched_from_elsewhere():
+def test_nothing_is_fetched_from_elsewhere_and_tables_scroll():
     page = as_page(TEXT, {"a.png": b""})
     places = [value for _, attributes in seen(page) for name, value in attributes.items() if name in ("src", "href")]
     assert all(place.startswith("data:") for place in places)
     assert "<title>Title ‖R‖</title>" in page
-
-
-def test_tables_are_tables_that_scroll():
     tags = [tag for tag, _ in seen(as_page(TEXT, {}))]
     assert tags.count("table") == tags.count("div") == 1
     assert tags.count("td") == tags.count("th") == 2

@@ -81,16 +81,13 @@ def test_jaxrot_and_its_peers_are_judged_alike(measured):
     assert (of(measured, "right").threads, of(measured, "right").computes_in) == (3, "float64")
 
 
-def test_what_is_refused_is_counted_and_infinitely_wrong(measured):
+def test_what_is_refused_or_no_number_is_counted_and_infinitely_wrong(measured):
     # The first of every call of 16.
     refuses = of(measured, "refuses")
     assert refuses.no_result == refuses.outside == 3
     assert refuses.error.largest == np.inf
     assert refuses.error.median < 1e-6
     assert refuses.gradient_time is None
-
-
-def test_a_gradient_that_is_no_number_is_counted(measured):
     contender = of(measured, "NaN")
     assert contender.gradient_no_number == 40
     assert contender.gradient_error.median == np.inf
@@ -98,19 +95,16 @@ def test_a_gradient_that_is_no_number_is_counted(measured):
     assert of(measured, "right").families_no_number == ()
 
 
-def test_the_skipped_are_named_with_the_reason(measured):
-    assert measured.skipped == [
-        "absent is skipped: no such device.",
-        "not installed is skipped: no_such_package not installed.",
-    ]
-
-
-def test_the_tables_name_everybody(measured):
+def test_the_tables_name_everybody_and_the_skipped_have_a_reason(measured):
     table = peers_table(measured.contenders, "float32")
     assert {row[0] for row in table.rows} == {"singular_pair", "singular_pair in float64", "right", "refuses", "NaN"}
     assert [row[0].startswith("singular_pair") for row in table.rows] == [True, True, False, False, False]
     assert all(len(row) == len(table.header) for row in table.rows)
     assert len(sources_table(measured.contenders).rows) == 5
+    assert measured.skipped == [
+        "absent is skipped: no such device.",
+        "not installed is skipped: no_such_package not installed.",
+    ]
 
 
 def test_a_peer_beyond_the_front_is_said(measured):
@@ -140,7 +134,7 @@ def test_every_peer_that_is_here_finds_the_nearest_rotation(name):
             assert np.median(relative.astype(float)) < 0.3
 
 
-def test_a_peer_that_takes_nothing_has_no_time():
+def test_scipy_refuses_reflections_alone_and_what_takes_nothing_has_no_time():
     inverted = -np.eye(3) * np.ones((5, 1, 1))
     own = judge({"own": inverted}, "float64", whole=WHOLE)
     judged = {"input": own, "families": judge({"easy": inverted}, "float64")}
@@ -150,6 +144,9 @@ def test_a_peer_that_takes_nothing_has_no_time():
     (contender,) = measured.contenders
     assert (contender.time, contender.no_result) == (None, 5)
     assert peers_table(measured.contenders, "float64").rows[0][7] == "-"
+    peer = make_peer(peers.PEERS["SciPy from_matrix"], "float64")
+    rotation = peer.unload(peer.value(peer.load(MATRICES)))
+    np.testing.assert_array_equal(np.isnan(rotation[:, 0, 0]), np.linalg.det(MATRICES) <= 0)
 
 
 def test_a_peer_is_timed_on_what_it_takes(monkeypatch):
@@ -169,9 +166,3 @@ def test_a_nan_is_nobodys_fault(rest):
     assert contender.no_result == contender.outside == 0
     assert (contender.error is None) == (len(rest) == 0)
     assert bool(peer_comparison._calls(candidate(peer, 7), matrices)) == (len(rest) > 0)
-
-
-def test_scipy_refuses_reflections_alone():
-    peer = make_peer(peers.PEERS["SciPy from_matrix"], "float64")
-    rotation = peer.unload(peer.value(peer.load(MATRICES)))
-    np.testing.assert_array_equal(np.isnan(rotation[:, 0, 0]), np.linalg.det(MATRICES) <= 0)

@@ -9,15 +9,6 @@ from commands import measure_nothing, refused
 from jaxrot.report import command
 
 
-def _save_text(path):
-    path.write_text("1 2 3\n")
-
-
-def _save_objects(path):
-    with path.open("wb") as file:
-        np.save(file, np.array([[{}]], dtype=object), allow_pickle=True)
-
-
 def _save(array):
     def save(path):
         with path.open("wb") as file:
@@ -42,7 +33,7 @@ def _save_torn_archive(path):
 BAD_FILES = {
     "missing": (lambda path: None, "no such file"),
     "folder": (lambda path: path.mkdir(), "not a file"),
-    "text": (_save_text, "cannot be read"),
+    "text": (lambda path: path.write_text("1 2 3\n"), "cannot be read"),
     "empty_file": (lambda path: path.touch(), "cannot be read"),
     "wrong_shape": (_save(np.ones((3, 4))), "shape (3, 4)"),
     "trailing_batch": (_save(np.ones((3, 3, 7))), "shape (3, 3, 7)"),
@@ -50,7 +41,7 @@ BAD_FILES = {
     "complex": (_save(np.ones((3, 3), complex)), "complex128"),
     "words": (_save(np.full((3, 3), "a")), "<U1"),
     "dates": (_save(np.full((3, 3), "2020-01-01", "datetime64[D]")), "datetime64"),
-    "objects": (_save_objects, "Python objects"),
+    "objects": (_save(np.array([[{}]], dtype=object)), "Python objects"),
     "empty": (_save(np.ones((0, 3, 3))), "empty"),
     "archive_without": (_save_archive(a=np.ones(3), b=np.ones((2, 2))), "no array of shape (..., 3, 3)"),
     "archive_of_nothing": (_save_archive(), "no array of shape (..., 3, 3)"),
@@ -83,6 +74,7 @@ def test_a_bad_file_is_refused_in_one_line(kind, tmp_path, capsys):
 def test_a_bad_option_is_refused_in_one_line(words, expected, tmp_path, capsys):
     assert expected in refused(["report", "--out", tmp_path / "out", *words], capsys)
     assert list(tmp_path.iterdir()) == []
+    assert "required: COMMAND" in refused([], capsys)
 
 
 @pytest.mark.parametrize(
@@ -94,10 +86,6 @@ def test_a_file_that_is_no_report_is_not_compared_with(text, expected, tmp_path,
     words = ["report", "--compare", tmp_path / "old.json", "--out", tmp_path / "out"]
     assert expected in refused(words, capsys)
     assert not (tmp_path / "out").exists()
-
-
-def test_no_command_is_refused_in_one_line(capsys):
-    assert "required: COMMAND" in refused([], capsys)
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "file/far/below"])

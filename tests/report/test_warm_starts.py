@@ -25,10 +25,12 @@ def measured(judged):
     return {(entry.step, entry.iterations): entry for entry in found}
 
 
-def test_starts_are_the_angle_off(judged):
+def test_starts_are_the_angle_off_and_without_peers_the_paper_is_left_out(judged):
     starts = warm_starts._turned(judged)
     cosine = (np.einsum("nij,nij->n", starts, judged.solution.rotation) - 1) / 2
     np.testing.assert_allclose(np.rad2deg(np.arccos(cosine.astype(float))), ANGLE_DEGREES, rtol=1e-9)
+    assert PAPER not in warm_starts.steps_to_measure(with_peers=False)
+    assert PAPER in warm_starts.steps_to_measure(with_peers=True)
 
 
 @pytest.mark.exhaustive
@@ -53,8 +55,3 @@ def test_the_papers_own_code_takes_the_same_steps(measured):
     for iterations in (1, 3):
         own, paper = measured["torque", iterations].error, measured[PAPER, iterations].error
         np.testing.assert_allclose(paper, own, rtol=1e-6)
-
-
-def test_without_peers_the_paper_is_left_out():
-    assert PAPER not in warm_starts.steps_to_measure(with_peers=False)
-    assert PAPER in warm_starts.steps_to_measure(with_peers=True)

@@ -107,7 +107,7 @@ def test_what_is_switched_off_is_not_in_the_program(bodies):
     assert asked == {1: False, 7: True}
 
 
-def test_a_free_top_keeps_energy_and_momentum_and_comes_back():
+def test_a_free_top_keeps_energy_and_momentum_and_comes_back_and_a_cycle_needs_no_axis():
     moments = np.array([1.0, 2, 3])
     starts = np.random.default_rng(1).normal(size=(8, 3))
     rates, time_step = tumbling_rates(moments, starts, 64)
@@ -119,6 +119,8 @@ def test_a_free_top_keeps_energy_and_momentum_and_comes_back():
     slow, slow_step = tumbling_rates(moments, starts / 7, 64)
     np.testing.assert_allclose(7 * slow, rates, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(slow_step, 7 * time_step)
+    start, parameters = drift.build(np.zeros((2, 1, 3)), 1)
+    np.testing.assert_array_equal(jax.jit(cycles.power)(parameters.cycle, jnp.int32(5)), start.rotation)
 
 
 @pytest.mark.exhaustive
@@ -136,11 +138,6 @@ def test_the_scene_runs(monkeypatch):
     assert all(float(value) < 1e-4 for value in health.values())
     assert float(health["orthonormality error, no repair (1)"]) > 10 * EPS
     assert float(health["orthonormality error, taylor (1)"]) < 3 * EPS
-
-
-def test_rotations_of_a_cycle_need_no_axis():
-    start, parameters = drift.build(np.zeros((2, 1, 3)), 1)
-    np.testing.assert_array_equal(jax.jit(cycles.power)(parameters.cycle, jnp.int32(5)), start.rotation)
 
 
 @pytest.mark.parametrize(

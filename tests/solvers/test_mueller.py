@@ -24,16 +24,13 @@ def test_full_rank_inversion_and_rank_two_give_the_nearest_rotation(s, dtype):
     assert error.max() < 100 * np.finfo(dtype).eps
 
 
-def test_rank_one_gives_a_rotation_and_not_a_nearest_one_and_zero_the_identity():
+def test_rank_one_gives_a_rotation_zero_the_identity_and_the_thresholds_are_relative():
     np.testing.assert_array_equal(solve(np.zeros((3, 3))), np.eye(3))
     matrices = stretched((1, 0, 0), 64, "float64")
     rotation = np.asarray(solve(matrices))
     assert reference.orthogonality_error(rotation).max() < 1e-14
     assert reference.lost_trace(rotation, matrices).min() > 1e-3
-
-
-def test_the_thresholds_are_relative():
-    """With the paper's absolute 1e-4 a small matrix would count as rank 0 and give U = 1."""
+    # With the paper's absolute 1e-4 a small matrix would count as rank 0 and give U = 1.
     matrices = FAMILIES["gaussian"].sample(64, dtype=np.float64).matrices
     np.testing.assert_array_equal(solve(matrices), solve(matrices * 2.0**-40))
     small = np.abs(np.linalg.svd(matrices * 2.0**-40, compute_uv=False)).max()

@@ -1,14 +1,20 @@
-"""The decompositions behind `jacobi_svd` and `implicit_qr_svd`: A = U diag(s) Vᵀ with rotations U and V."""
+"""`jacobi_svd` and `implicit_qr_svd`: A = U diag(s) Vᵀ with rotations; `svd` and `davenport`: NaN without LAPACK."""
+
+import subprocess
+import sys
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import CACHED
 
+from jaxrot import METHODS
 from jaxrot._algebra import mat3
 from jaxrot._algebra.scaling import safe_divide, scaled
+from jaxrot._nearest import solved
 from jaxrot.evaluation import reference
-from jaxrot.families import FAMILIES
+from jaxrot.families import FAMILIES, with_non_finite
 from jaxrot.solvers import implicit_qr_svd, jacobi_svd
 
 MODULES = pytest.mark.parametrize("module", [jacobi_svd, implicit_qr_svd], ids=["jacobi_svd", "implicit_qr_svd"])
@@ -61,3 +67,36 @@ def test_a_zero_on_the_diagonal_of_the_bidiagonal_matrix_splits_off():
     _, s, _ = decompose(implicit_qr_svd)(matrix)
     golden = (5**0.5 + 1) / 2
     np.testing.assert_allclose(s, [golden, 1 / golden, 0], atol=1e-15)
+
+
+A = np.random.default_rng(0).standard_normal((9, 3, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize(("method", "routine"), [("svd", "svd"), ("davenport", "eigh")])
+def test_lapack_gets_finite_matrices_alone(method, routine, monkeypatch):
+    original = getattr(jnp.linalg, routine)
+    asked = []
+
+    def checking(matrix, **options):
+        asked.append(np.isfinite(matrix).all())
+        return original(matrix, **options)
+
+    monkeypatch.setattr(jnp.linalg, routine, checking)
+    rotation = np.asarray(solved(METHODS[method].solve, jnp.asarray(with_non_finite(A))))
+    assert asked == [True]
+    np.testing.assert_array_equal(
+        np.isnan(rotation).all(axis=(1, 2)), ~np.isfinite(with_non_finite(A)).all(axis=(1, 2))
+    )
+    clean = np.asarray(solved(METHODS[method].solve, jnp.asarray(A)))
+    np.testing.assert_array_equal(rotation[1::3], clean[1::3])
+
+
+def test_an_infinite_matrix_returns_within_a_time_limit():
+    program = """
+import jax, jax.numpy as jnp, jaxrot
+matrix = jnp.diag(jnp.array([jnp.inf, 1, 1]))
+for method in ("svd", "davenport"):
+    for function in (jaxrot.nearest_rotation, jax.jacrev(jaxrot.nearest_rotation)):
+        assert jnp.isnan(function(matrix, method=method)).all()
+"""
+    subprocess.run([sys.executable, "-c", program], env=CACHED, check=True, timeout=120)

@@ -41,16 +41,17 @@ def test_every_half_turn_start_and_its_neighbours_are_left_for_the_nearest_rotat
     assert reference.lost_trace(reached.reshape(-1, 3, 3)[::4], everywhere[::4]).max() < 16 * eps
 
 
-def test_the_equilibrium_of_equation_8_is_left_and_plain_torque_stays():
+def test_the_equilibrium_of_equation_8_and_a_triple_eigenvalue_are_left_in_both_forms():
     swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     np.testing.assert_allclose(refine_rotation(np.eye(3), swap, step="torque", iterations=50), swap, atol=1e-15)
     np.testing.assert_allclose(refine_rotation(np.eye(3), swap, iterations=0, escape=True), np.eye(3), atol=1e-15)
-
-
-def test_a_triple_eigenvalue_is_left_too():
-    """A = −1 at Q = 1: every axis is the weakest, each half turn is nearest."""
+    # A = −1 at Q = 1: every axis is the weakest, each half turn is nearest.
     reached = np.asarray(refine_rotation(-np.eye(3), np.eye(3), iterations=0, escape=True))
     assert reference.lost_trace(reached, -np.eye(3)) < 1e-15
+    reached = refine_quaternion_wxyz(np.eye(3), np.array([0.0, 1.0, 0.0, 0.0]), iterations=0, escape=True)
+    np.testing.assert_allclose(np.abs(reached), [1, 0, 0, 0], atol=1e-15)
+    with pytest.raises(TypeError, match="escape must be a static Python bool"):
+        refine_rotation(np.eye(3), np.eye(3), escape=1)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_start_that_is_nearest_is_kept_bit_for_bit():
@@ -76,10 +77,3 @@ def test_near_the_nearest_rotation_nothing_is_turned_even_where_an_eigenvalue_is
     b = start.T @ matrix
     assert np.linalg.eigvalsh(np.trace(b) * np.eye(3) - (b + b.T) / 2).min() < -1e-4
     np.testing.assert_allclose(escaped(matrix, start), start, atol=1e-15)
-
-
-def test_the_quaternion_form_leaves_too_and_a_traced_flag_is_refused():
-    reached = refine_quaternion_wxyz(np.eye(3), np.array([0.0, 1.0, 0.0, 0.0]), iterations=0, escape=True)
-    np.testing.assert_allclose(np.abs(reached), [1, 0, 0, 0], atol=1e-15)
-    with pytest.raises(TypeError, match="escape must be a static Python bool"):
-        refine_rotation(np.eye(3), np.eye(3), escape=1)  # pyright: ignore[reportArgumentType]

@@ -123,17 +123,14 @@ def test_quest_is_exact_in_one_step_and_cayley_reaches_the_contract_from_45_degr
     assert posed.outside(repeat("cayley", posed.matrices, posed.near, 5)) == 0
 
 
-def test_saddles_repel_newton(dtype):
+def test_saddles_repel_newton_and_it_passes_a_quarter_turn_about_the_weakest_axis(dtype):
     """A hundredth off a half turn about each principal axis: Newton's own axis leads straight back to it."""
     posed = problem(dtype, 10)
     starts = half_turn_starts(np.asarray(posed.nearest, float), np.asarray(posed.axes, float))[:3]
     off = turns(np.random.default_rng(2), len(posed.matrices), 0.01)
     for start in starts:
         assert posed.outside(repeat("newton", posed.matrices, (start @ off).astype(dtype), 10)) == 0
-
-
-def test_newton_passes_a_quarter_turn_about_the_weakest_axis(dtype):
-    """There the gap of that axis vanishes and the torque about it does not, as small as it is."""
+    # There the gap of that axis vanishes and the torque about it does not, as small as it is.
     posed = problem(dtype, 1000)
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     axes = np.asarray(posed.axes, float)
