@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import jax
-from jax import export
+from jax import export, lax
 
 from jaxrot._inputs import computing
 
@@ -16,6 +16,9 @@ _Record = TypeVar("_Record")
 
 def compiled(function: Callable[..., _Result]) -> Callable[..., _Result]:
     """Jits a function of validated arrays. It computes in the computing dtype of the first array, the matrices.
+
+    A barrier stands before the arguments: with a constant of extreme size XLA would form the product of two scaling
+    factors, which overflows (NaN for a zero matrix that is written into a jitted program, on jax 0.10).
 
     Further arrays are converted to that dtype. Results have the dtype of the first array. Without `jit` JAX would
     dispatch every operation, 1,800 for the default method, and compile a loop again in every call.
@@ -33,7 +36,8 @@ def compiled(function: Callable[..., _Result]) -> Callable[..., _Result]:
     @functools.wraps(function)
     def run(matrix, *others, **options):
         value, dtype = computing(matrix)
-        result = function(value, *(other.astype(value.dtype) for other in others), **options)
+        arrays = [value, *(other.astype(value.dtype) for other in others)]
+        result = function(*lax.optimization_barrier(arrays), **options)
         return jax.tree.map(lambda x: x.astype(dtype), result)
 
     return run

@@ -6,6 +6,7 @@ import itertools
 import hypothesis
 import hypothesis.extra.numpy as arrays
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from certificate import Batch, assert_contract, assert_forward_error, family_batch, in_families, resolved
@@ -180,3 +181,15 @@ def test_entries_below_the_smallest_normal_number_count_as_zero():
 
 def test_without_64_bit_types_a_float64_array_is_computed_in_float32(without_x64):
     assert nearest_rotation(np.eye(3, dtype=np.float64)).dtype == np.float32
+
+
+@pytest.mark.parametrize("exponent", [-38, -25, 25, 38])
+def test_a_matrix_written_into_the_program_may_have_any_size(exponent):
+    """XLA multiplies constants in an order of its own: the product of two scaling factors would overflow."""
+    size = np.float32(10) ** exponent
+    for entries in (np.zeros((3, 3)), np.ones((3, 3)), np.diag([3.0, 2, 1])):
+        matrix = entries.astype(np.float32) * size
+        inside = jax.jit(lambda matrix=matrix: nearest_rotation(matrix))()
+        np.testing.assert_allclose(inside.T @ inside, np.eye(3), atol=1e-6)
+    filled = jax.jit(lambda: nearest_rotation(jnp.full((3, 3), size)))()
+    np.testing.assert_allclose(filled.T @ filled, np.eye(3), atol=1e-6)
